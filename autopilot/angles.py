@@ -1,0 +1,16 @@
+"""Angles and the signed power, on plain floats."""
+
+import math
+
+
+def wrap(angle: float) -> float:
+    """The same direction in [-pi, pi). `angle` in rad; exact (returned as it is) when already inside."""
+    if -math.pi <= angle < math.pi:
+        return angle
+    wrapped = math.remainder(angle, math.tau)
+    return wrapped if wrapped < math.pi else -math.pi
+
+
+def sig(x: float, power: float) -> float:
+    """sig^power(x) = sign(x) |x|^power (paper, after Eq. 11); `power` > 0."""
+    return math.copysign(math.pow(abs(x), power), x)

@@ -1,0 +1,62 @@
+"""The wires of a guidance law: what it may know, what it answers."""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+
+class Observation(NamedTuple):
+    """All that a law may know. SI, rad, world frame north-east from the flight's origin; headings clockwise from north.
+
+    `heading` is psi_a, the direction of (ground velocity - estimated steady wind), and `heading_rate` its rate; not the
+    nose. The target is as estimated; its acceleration and turn rate are zero when unknown.
+    """
+
+    north: float
+    east: float
+    velocity_north: float  # over the ground
+    velocity_east: float
+    airspeed: float  # measured v_a
+    nominal_airspeed: float  # commanded v_a
+    heading: float
+    heading_rate: float
+    bank: float
+    roll_rate: float
+    wind_north: float  # estimated steady wind: where the air moves to
+    wind_east: float
+    target_north: float
+    target_east: float
+    target_velocity_north: float
+    target_velocity_east: float
+    target_acceleration: float  # rate of the target's speed
+    target_turn_rate: float
+
+
+class Guidance(NamedTuple):
+    """A law's answer. The command is limited; the rest is telemetry. SI, rad."""
+
+    heading_rate: float  # the command omega_psi
+    range_error: float  # r = L - R_d
+    sliding_variable: float  # s
+    heading_error: float  # psi_a against its desired value, in [-pi, pi)
+    feed_forward: float  # the part of the command that neither s nor the manifold makes
+    unlimited_command: float
+
+
+Step = Callable[[Observation], Guidance]
+
+
+class Law(Protocol):
+    """A guidance law: a frozen value of parameters. What it remembers, if anything, lives in what `start` returns."""
+
+    @property
+    def standoff(self) -> float: ...
+    @property
+    def max_heading_rate(self) -> float: ...
+
+    def start(self) -> Step:
+        """A fresh law in flight."""
+        ...
+
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        """The conditions its own theory asks for and these gains break; `speed_ratio` is (v_t + v_w) / v_a."""
+        ...

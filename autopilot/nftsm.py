@@ -1,0 +1,90 @@
+"""The paper's law: nonsingular fast terminal sliding mode guidance, Eq. (15)-(20)."""
+
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Lt
+
+from autopilot.angles import sig
+from autopilot.guidance import Step
+from autopilot.quantities import About
+from autopilot.standoff import RelativeMotion, StandoffLaw, standoff_step
+
+_TABLE_2 = {"alpha3": 0.2, "eta": 0.001, "beta3": 2.0 / 3.0, "k1": 0.05, "k2": 12.0, "k3": 6.0, "gamma1": 0.9}
+GAIN_SETS = MappingProxyType(
+    {
+        "paper": {"alpha2": 0.5, "beta2": 0.2, **_TABLE_2},  # Table 2, row NFTSM
+        "paper_1": {"alpha2": 2.0, "beta2": 3.0, **_TABLE_2},  # Table 2, row NFTSM_1
+    }
+)
+
+_SMALLEST_ELL = 1e-12  # |ell|^(beta2-1) is singular at 0 when beta2 < 1, as in the paper's own set
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nftsm(StandoffLaw):
+    """NFTSM guidance. Gains as in the paper; angles in rad, k1 in 1/m, k2 and k3 in 1/s."""
+
+    gains: Annotated[str, About("the named set the gains started from")] = "custom"
+    alpha2: Annotated[float, Ge(0), About("weight of the fast term of the manifold, Eq. (17)")]
+    alpha3: Annotated[float, Ge(0), About("weight of the terminal term, Eq. (17)")]
+    beta2: Annotated[float, Gt(0), About("power of the fast term; Definition 5 asks for at least 1")]
+    beta3: Annotated[float, Gt(0), Lt(1), About("power of the terminal term")]
+    eta: Annotated[float, Gt(0), About("|ell| below which the terminal term is smoothed")]
+    k1: Annotated[float, Gt(0), About("1/m: ell = arctan(k1 r)")]
+    k2: Annotated[float, Gt(0), About("1/s: linear reaching gain, Eq. (18)")]
+    k3: Annotated[float, Ge(0), About("1/s: power reaching gain, Eq. (18)")]
+    gamma1: Annotated[float, Gt(0), Lt(1), About("power of the reaching law, Eq. (18)")]
+
+    def start(self) -> Step:
+        return standoff_step(self, lambda motion: command(self, motion))
+
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        """What Definition 5, Eq. (28) and Eq. (30) ask for and these gains break, one sentence each."""
+        broken = []
+        if self.beta2 < 1.0:
+            broken.append(
+                f"beta2 = {self.beta2:g} is below 1 (Definition 5): the law is singular on the circle, at ell = 0"
+            )
+        reach = self.alpha2 * (math.pi / 2) ** self.beta2 + self.alpha3 * (math.pi / 2) ** self.beta3
+        if reach > math.pi:
+            broken.append(f"Eq. (28): alpha2 (pi/2)^beta2 + alpha3 (pi/2)^beta3 = {reach:.3g} exceeds pi")
+        xi = math.asin(min(1.0, speed_ratio))
+        if xi + reach >= math.pi / 2:
+            broken.append(
+                f"Eq. (30): arcsin((v_t + v_w)/v_a) + {reach:.3g} = {xi + reach:.3g} is not below pi/2: "
+                "on the manifold the aircraft may fly away from the circle"
+            )
+        return broken
+
+
+def sigma(x: float, beta3: float, eta: float) -> float:
+    """The smoothed terminal term of Definition 5."""
+    if abs(x) > eta:
+        return sig(x, beta3)
+    r1 = (2.0 - beta3) * eta ** (beta3 - 1.0)
+    r2 = (beta3 - 1.0) * eta ** (beta3 - 2.0)
+    return r1 * x + r2 * abs(x) * x
+
+
+def sigma_slope(x: float, beta3: float, eta: float) -> float:
+    """The derivative of `sigma`: r1 + 2 r2 |x| inside, where the paper prints r1 + 2 r2 x."""
+    if abs(x) > eta:
+        return beta3 * math.pow(abs(x), beta3 - 1.0)
+    r1 = (2.0 - beta3) * eta ** (beta3 - 1.0)
+    r2 = (beta3 - 1.0) * eta ** (beta3 - 2.0)
+    return r1 + 2.0 * r2 * abs(x)
+
+
+def command(g: Nftsm, m: RelativeMotion) -> tuple[float, float, float]:
+    """Eq. (17)-(19): (feed-forward, rest of the command, s), in rad/s, rad/s and rad; unlimited."""
+    k1_r = g.k1 * m.r
+    ell = math.atan(k1_r)
+    s = m.psi_a_err + g.alpha2 * sig(ell, g.beta2) + g.alpha3 * sigma(ell, g.beta3, g.eta)  # Eq. (17)
+    fast_slope = g.alpha2 * g.beta2 * math.pow(max(abs(ell), _SMALLEST_ELL), g.beta2 - 1.0)
+    slope = fast_slope + g.alpha3 * sigma_slope(ell, g.beta3, g.eta)
+    feed_forward = m.lam_dot + m.psi_a_d_dot
+    rest = -slope * g.k1 * m.r_dot / (1.0 + k1_r * k1_r) - g.k2 * s - g.k3 * sig(s, g.gamma1)  # Eq. (19)
+    return feed_forward, rest, s

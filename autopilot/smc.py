@@ -1,0 +1,43 @@
+"""The law the paper compares with: sliding mode control with a linear-arctan manifold, Eq. (34)-(35)."""
+
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Annotated
+
+from annotated_types import Gt
+
+from autopilot.guidance import Step
+from autopilot.quantities import About
+from autopilot.standoff import RelativeMotion, StandoffLaw, standoff_step
+
+GAIN_SETS = MappingProxyType(
+    {"paper": {"c1": 0.2, "c2": 0.05, "c3": 0.005, "epsilon": 0.2}}  # Table 2, the row labelled TSM
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Smc(StandoffLaw):
+    """SMC guidance. c2 in 1/m, c3 in rad/s, the rest in rad."""
+
+    gains: Annotated[str, About("the named set the gains started from")] = "custom"
+    c1: Annotated[float, Gt(0), About("rad: height of the manifold, Eq. (34)")]
+    c2: Annotated[float, Gt(0), About("1/m: steepness of the manifold, Eq. (34)")]
+    c3: Annotated[float, Gt(0), About("rad/s: reaching gain, Eq. (35)")]
+    epsilon: Annotated[float, Gt(0), About("rad: half width of the boundary layer, Eq. (35)")]
+
+    def start(self) -> Step:
+        return standoff_step(self, lambda motion: command(self, motion))
+
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        """The paper asks for positive gains only, which the fields hold."""
+        return []
+
+
+def command(g: Smc, m: RelativeMotion) -> tuple[float, float, float]:
+    """Eq. (34)-(35): (feed-forward, rest of the command, s), in rad/s, rad/s and rad; unlimited."""
+    c2_r = g.c2 * m.r
+    s = m.psi_a_err + g.c1 * math.atan(c2_r)  # Eq. (34)
+    feed_forward = m.lam_dot + m.psi_a_d_dot
+    sat = max(-1.0, min(1.0, s / g.epsilon))
+    return feed_forward, -g.c1 * g.c2 * m.r_dot / (1.0 + c2_r * c2_r) - g.c3 * sat, s  # Eq. (35)

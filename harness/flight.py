@@ -1,0 +1,151 @@
+"""A flight as a value: everything that decides it, and what is wrong or remarkable about that."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge, Gt
+
+import aircraft
+from autopilot.quantities import About, Metres, Seconds
+from autopilot.standoff import StandoffLaw
+from harness.kinematic import Kinematic
+from harness.plant import Plant, Start
+from harness.target import Target
+from harness.wind import Wind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InnerLoop:
+    """Settings of the 6-DOF plant's inner loop."""
+
+    rate_trim: Annotated[bool, About("slow integrator that removes the turn-rate shortfall of a bank-only turn")] = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimator:
+    """What the law knows of the target."""
+
+    kind: Annotated[Literal["truth"], About("truth: the target's own state")] = "truth"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricSettings:
+    """What counts as converged, and as lost."""
+
+    tolerance: Annotated[Metres, Gt(0), About("|range error| below it for good is convergence")] = 1.0
+    monitoring_range: Annotated[Metres | None, Gt(0), About("beyond it the target is lost")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flight:
+    """One flight. Defaults are the paper's stationary case (Table 1)."""
+
+    plant: Annotated[Literal["kinematic", "sixdof"], About("everything below the heading-rate command")]
+    law: StandoffLaw
+    aircraft: Annotated[str, About("an airframe by name, or its folder")] = "ultra_stick_25e"
+    duration: Annotated[Seconds, Gt(0), About("length of the flight")] = 100.0
+    guidance_period: Annotated[Seconds, Gt(0), About("the law's command is held in between")] = 0.05
+    step: Annotated[Seconds, Gt(0), About("of the 6-DOF simulation; periods are whole multiples of it")] = 0.005
+    seed: Annotated[int, Ge(0), About("of everything random")] = 0
+    start: Start = field(default_factory=Start)
+    target: Target = field(default_factory=Target)
+    wind: Wind = field(default_factory=Wind)
+    estimator: Estimator = field(default_factory=Estimator)
+    inner_loop: InnerLoop = field(default_factory=InnerLoop)
+    metrics: MetricSettings = field(default_factory=MetricSettings)
+
+    @property
+    def periods(self) -> int:
+        """The number of guidance periods in the flight."""
+        return round(self.duration / self.guidance_period)
+
+
+class Problem(NamedTuple):
+    """Something wrong with a value: the dotted name of the field, and what is wrong."""
+
+    name: str
+    message: str
+
+
+def plant_of(flight: Flight) -> Plant:
+    """The plant that the flight names."""
+    if flight.plant == "kinematic":
+        return Kinematic()
+    from harness.sixdof import SixDof  # JSBSim is loaded by those who fly it
+
+    return SixDof(aircraft.folder(flight.aircraft), flight.step, flight.inner_loop.rate_trim)
+
+
+def problems(flight: Flight) -> list[Problem]:
+    """What makes the flight impossible as it is set, beyond what each field says of itself; empty when it can start."""
+    found = []
+    for name, period, unit_name, unit in (
+        ("guidance_period", flight.guidance_period, "step", flight.step),
+        ("duration", flight.duration, "guidance_period", flight.guidance_period),
+    ):
+        if not _is_multiple(period, unit):
+            found.append(Problem(name, f"{period:g} s is no whole multiple of {unit_name}, {unit:g} s"))
+    speed = math.hypot(*flight.wind.steady)
+    if speed >= flight.start.airspeed:
+        found.append(
+            Problem("wind.steady", f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s")
+        )
+    for i, segment in enumerate(flight.target.segments):
+        if segment.to <= segment.from_:
+            found.append(
+                Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
+            )
+    slowest = min(leg.speed for leg in flight.target.legs())
+    if slowest < -1e-9:
+        found.append(Problem("target.segments", f"slow the target down to {slowest:g} m/s, must stay at or above 0"))
+    try:
+        aircraft.folder(flight.aircraft)
+    except FileNotFoundError:
+        found.append(Problem("aircraft", f"{flight.aircraft!r}, allowed: {', '.join(aircraft.names())}, or a folder"))
+    return found
+
+
+def _is_multiple(period: float, unit: float) -> bool:
+    return round(period / unit) >= 1 and math.isclose(round(period / unit) * unit, period, rel_tol=1e-9)
+
+
+def relative_speed(flight: Flight) -> float:
+    """The largest |wind - target velocity| of the flight, m/s, at the target's breakpoints and twice a second."""
+    W_x, W_y = flight.wind.steady
+    at = flight.target.start()
+    times = {leg.begin for leg in flight.target.legs()} | {0.5 * k for k in range(int(2 * flight.duration) + 1)}
+    seen = [at(t) for t in times if t <= flight.duration]
+    return max(math.hypot(W_x - s.target_velocity_north, W_y - s.target_velocity_east) for s in seen)
+
+
+def needed_heading_rate(flight: Flight) -> float:
+    """The largest heading rate that holding the circle takes, (v_a + w)^2 / (v_a R_d), rad/s."""
+    v_a = flight.start.airspeed
+    return (v_a + relative_speed(flight)) ** 2 / (v_a * flight.law.standoff)
+
+
+def feasibility_margin(flight: Flight) -> float:
+    """The heading-rate limit minus what holding the circle takes, rad/s; negative: the circle cannot be held."""
+    return flight.law.max_heading_rate - needed_heading_rate(flight)
+
+
+def warnings(flight: Flight) -> list[str]:
+    """What the user should know before trusting the flight; it is flown all the same."""
+    said = []
+    v_a = flight.start.airspeed
+    fastest = max(abs(leg.speed) for leg in flight.target.legs())
+    ratio = (fastest + math.hypot(*flight.wind.steady)) / v_a
+    if ratio >= 1.0:
+        said.append(f"Remark 1 asks for v_t + v_w < v_a; here it is {ratio * v_a:.3g} m/s of {v_a:g} m/s")
+    if feasibility_margin(flight) < 0:
+        said.append("the circle is infeasible: the heading-rate limit is below what holding it takes")
+    if flight.plant == "sixdof":
+        needed = math.atan(v_a * flight.law.max_heading_rate / 9.80665)
+        limit = aircraft.bank_limit(aircraft.folder(flight.aircraft))
+        if needed > limit:
+            said.append(
+                f"the heading-rate limit takes {math.degrees(needed):.0f} deg of bank, the inner loop allows "
+                f"{math.degrees(limit):.0f}"
+            )
+    return said + flight.law.broken_conditions(ratio)

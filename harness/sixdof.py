@@ -1,0 +1,269 @@
+"""The 6-DOF plant: a JSBSim airframe with its native inner loop. The only file with JSBSim, and with feet, in it."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import jsbsim
+import numpy as np
+
+import aircraft
+import autopilot
+from autopilot.angles import wrap
+from harness.plant import End, Flying, Outcome, PlantError, Start
+from harness.state import State
+from harness.wind import Wind
+
+FT = 0.3048  # m
+GROUND = 15.0  # m: below this height the flight has ended
+DEPARTURE_BANK = math.radians(80.0)
+STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
+
+_HARNESS = Path(__file__).parent
+_INNER_LOOP = Path(autopilot.__file__).parent
+_AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
+
+
+class _LoadLog(jsbsim.FGLogger):
+    """Keeps what JSBSim reports at WARN or above: it tells Python nothing else of a model it could not read whole."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self._text = ""
+
+    def message(self, message: str) -> None:
+        self._text += message
+
+    def flush(self) -> None:
+        if jsbsim.LogLevel.WARN <= self.log_level <= jsbsim.LogLevel.FATAL:
+            self.problems.append(" ".join(self._text.split()))
+        self._text = ""
+
+
+_load_log = _LoadLog()
+jsbsim.set_logger(_load_log)
+jsbsim.FGJSBBase().debug_lvl = 0
+
+
+class ModelError(RuntimeError):
+    """JSBSim could not load the model as it is written."""
+
+
+def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
+    """A fresh JSBSim with this airframe, stepping every `step` seconds. Raises `ModelError` with what JSBSim said."""
+    _load_log.problems.clear()
+    fdm = jsbsim.FGFDMExec(None)
+    fdm.set_dt(step)  # before the model: its components keep the step they were made with
+    try:
+        loaded = fdm.load_planet(str(_HARNESS / "planet.xml"), False) and fdm.load_model_with_paths(
+            airframe.name, str(airframe.parent), str(airframe), str(_INNER_LOOP), True
+        )
+    except jsbsim.BaseError as error:
+        raise ModelError(f"{aircraft.model(airframe)}: {error}") from error
+    if not loaded or _load_log.problems:
+        raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
+    for integrator in ("rate", "position"):
+        write(fdm, f"simulation/integrator/{integrator}/rotational", _AB2)
+    return fdm
+
+
+def write(fdm: jsbsim.FGFDMExec, name: str, value: float) -> None:
+    """Sets a property that exists: JSBSim creates one for every mistyped name."""
+    if not fdm.get_property_manager().hasNode(name):
+        raise ModelError(f"the model has no property {name!r}")
+    fdm[name] = value
+
+
+class Trim(NamedTuple):
+    """Steady level flight: rad, rad, 0-1."""
+
+    pitch: float
+    elevator: float
+    throttle: float
+
+
+def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
+    """Puts the aircraft at `start`, level and unaccelerated, and gives the trim that does it.
+
+    Newton's method on the accelerations that JSBSim reports, with the surfaces placed directly: their actuators do not
+    run before engagement, so no lag falsifies the result. Raises `PlantError` where there is no such trim.
+    """
+    _place(fdm, start, wind)
+    x = np.array([0.05, 0.0, 0.5])
+    for _ in range(30):
+        residual = _accelerations(fdm, x)
+        if np.abs(residual).max() < 1e-11:
+            break
+        slopes = np.array([(_accelerations(fdm, x + h) - residual) / 1e-5 for h in 1e-5 * np.eye(3)]).T
+        change = np.linalg.lstsq(slopes, -residual)[0]
+        x = x + change * min(1.0, 0.1 / max(np.abs(change).max(), 1e-9))
+    residual = _accelerations(fdm, x)
+    found = Trim(*x.tolist())
+    if not (np.abs(residual).max() < 1e-8 and 0.0 < found.throttle < 1.0 and abs(found.pitch) < math.pi / 6):
+        raise PlantError("start.airspeed", f"no level trim at {start.airspeed:g} m/s")
+    return found
+
+
+def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> None:
+    """The initial condition in the order that JSBSim needs: attitude, wind, then velocity over the ground.
+
+    The start lies on the equator, where the local north turns least along the way.
+    """
+    W_x, W_y = wind.steady
+    write(fdm, "ic/lat-geod-rad", 0.0)
+    write(fdm, "ic/long-gc-rad", 0.0)
+    write(fdm, "ic/h-sl-ft", start.altitude / FT)
+    write(fdm, "ic/phi-rad", 0.0)
+    write(fdm, "ic/theta-rad", 0.0)
+    write(fdm, "ic/psi-true-rad", start.heading)
+    write(fdm, "ic/vw-mag-fps", math.hypot(W_x, W_y) / FT)
+    write(fdm, "ic/vw-dir-deg", math.degrees(math.atan2(W_y, W_x)))
+    write(fdm, "ic/vn-fps", (start.airspeed * math.cos(start.heading) + W_x) / FT)
+    write(fdm, "ic/ve-fps", (start.airspeed * math.sin(start.heading) + W_y) / FT)
+    write(fdm, "ic/vd-fps", 0.0)
+    write(fdm, "actuators/engaged", 0.0)
+    write(fdm, "inner-loop/engaged", 0.0)
+
+
+def _accelerations(fdm: jsbsim.FGFDMExec, x: np.ndarray) -> np.ndarray:
+    """(u', w', q') in m/s^2, m/s^2, rad/s^2 at pitch, elevator, throttle `x`."""
+    fdm["ic/theta-rad"] = x[0]
+    fdm["fcs/elevator-pos-rad"] = x[1]
+    fdm["actuators/throttle-norm"] = x[2]
+    fdm.run_ic()
+    return np.array(
+        [
+            FT * fdm["accelerations/udot-ft_sec2"],
+            FT * fdm["accelerations/wdot-ft_sec2"],
+            fdm["accelerations/qdot-rad_sec2"],
+        ]
+    )
+
+
+def engage(fdm: jsbsim.FGFDMExec, trimmed: Trim, start: Start, rate_trim: bool) -> None:
+    """Hands the trimmed aircraft to its inner loop, which holds this altitude and airspeed."""
+    write(fdm, "inner-loop/trim/pitch-rad", trimmed.pitch)
+    write(fdm, "inner-loop/trim/elevator-rad", trimmed.elevator)
+    write(fdm, "inner-loop/trim/throttle-norm", trimmed.throttle)
+    write(fdm, "inner-loop/command/altitude-m", start.altitude)
+    write(fdm, "inner-loop/command/airspeed-mps", start.airspeed)
+    write(fdm, "inner-loop/command/heading-rate-rad_s", 0.0)
+    write(fdm, "inner-loop/rate-trim", float(rate_trim))
+    write(fdm, "inner-loop/engaged", 1.0)
+    write(fdm, "actuators/engaged", 1.0)
+
+
+_READ = (
+    "position/from-start-neu-n-ft",
+    "position/from-start-neu-e-ft",
+    "position/h-sl-ft",
+    "velocities/v-north-fps",
+    "velocities/v-east-fps",
+    "velocities/v-down-fps",
+    "velocities/vt-fps",
+    "velocities/u-fps",
+    "velocities/v-fps",
+    "velocities/w-fps",
+    "velocities/p-rad_sec",
+    "velocities/q-rad_sec",
+    "velocities/r-rad_sec",
+    "accelerations/udot-ft_sec2",
+    "accelerations/vdot-ft_sec2",
+    "accelerations/wdot-ft_sec2",
+    "attitude/phi-rad",
+    "attitude/theta-rad",
+    "attitude/psi-rad",
+    "inner-loop/bank-command-rad",
+    "aero/alpha-rad",
+    "aero/beta-rad",
+    "fcs/left-aileron-pos-rad",
+    "fcs/elevator-pos-rad",
+    "fcs/rudder-pos-rad",
+    "actuators/throttle-norm",
+    "atmosphere/total-wind-north-fps",
+    "atmosphere/total-wind-east-fps",
+    "atmosphere/total-wind-down-fps",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SixDof:
+    """A JSBSim airframe under its native inner loop, stepped every `step` seconds."""
+
+    airframe: Path
+    step: float
+    rate_trim: bool
+
+    def start(self, start: Start, wind: Wind) -> Flying:
+        if not start.altitude > GROUND:
+            raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
+        fdm = load(self.airframe, self.step)
+        trimmed = trim(fdm, start, wind)
+        stall = aircraft.data(self.airframe)["aero"]["alpha_stall"]["v"]
+        if trimmed.pitch >= stall:
+            raise PlantError("start.airspeed", f"{start.airspeed:g} m/s: level flight would be beyond the stall")
+        engage(fdm, trimmed, start, self.rate_trim)
+        return _SixDofFlying(fdm, self.step, start, wind, stall)
+
+
+class _SixDofFlying:
+    def __init__(self, fdm: jsbsim.FGFDMExec, step: float, start: Start, wind: Wind, stall: float) -> None:
+        manager = fdm.get_property_manager()
+        self._run: Callable[[], bool] = fdm.run
+        self._readers = [manager.get_node(name).get_double_value for name in _READ]
+        self._command = manager.get_node("inner-loop/command/heading-rate-rad_s").set_double_value
+        self._step = step
+        self._north, self._east = start.position
+        self._wind = wind.steady
+        self._gravity = FT * fdm["accelerations/gravity-ft_sec2"]
+        self._stall, self._stalled_for = stall, 0.0
+        self.state = self._read()
+
+    def advance(self, heading_rate: float, period: float) -> None:
+        self._command(heading_rate)
+        run = self._run
+        for _ in range(round(period / self._step)):
+            run()
+        self.state = state = self._read()
+        if not state.altitude > GROUND or not abs(state.bank) < DEPARTURE_BANK or not state.angle_of_attack < self._stall:
+            self._judge(state, period)
+        else:
+            self._stalled_for = 0.0
+
+    def _judge(self, state: State, period: float) -> None:
+        if not all(map(math.isfinite, state)):
+            raise End(Outcome.INVALID, "a number of the simulated aircraft is not finite")
+        if state.altitude <= GROUND:
+            raise End(Outcome.GROUND, f"below {GROUND:g} m")
+        if abs(state.bank) >= DEPARTURE_BANK:
+            raise End(Outcome.DEPARTED, f"bank of {math.degrees(state.bank):.0f} deg")
+        self._stalled_for += period
+        if self._stalled_for > STALL_TIME:
+            raise End(Outcome.DEPARTED, f"stalled for {STALL_TIME:g} s")
+
+    def _read(self) -> State:
+        (
+            n, e, h, v_n, v_e, v_d, V, u, v, w, p, q, r, u_dot, v_dot, w_dot,
+            phi, theta, psi, phi_c, alpha, beta, d_a, d_e, d_r, d_t, w_n, w_e, w_d,
+        ) = [get() for get in self._readers]  # fmt: skip
+        W_x, W_y = self._wind
+        V_x, V_y = v_n * FT - W_x, v_e * FT - W_y  # velocity in the steady air
+        sin_phi, cos_phi = math.sin(phi), math.cos(phi)
+        sin_theta, cos_theta = math.sin(theta), math.cos(theta)
+        sin_psi, cos_psi = math.sin(psi), math.cos(psi)
+        a_x = FT * (u_dot + q * w - r * v)  # acceleration over the ground, body axes
+        a_y = FT * (v_dot + r * u - p * w)
+        a_z = FT * (w_dot + p * v - q * u)
+        a_ahead = a_x * cos_theta + (a_y * sin_phi + a_z * cos_phi) * sin_theta  # the same in the horizontal plane
+        a_right = a_y * cos_phi - a_z * sin_phi
+        a_n, a_e = a_ahead * cos_psi - a_right * sin_psi, a_ahead * sin_psi + a_right * cos_psi
+        g = self._gravity
+        return State(
+            self._north + n * FT, self._east + e * FT, h * FT, v_n * FT, v_e * FT, v_d * FT, V * FT,
+            math.atan2(V_y, V_x), (V_x * a_e - V_y * a_n) / (V_x * V_x + V_y * V_y),
+            phi, theta, wrap(psi), p, q, r, phi_c, alpha, beta,
+            a_y - g * sin_phi * cos_theta, cos_phi * cos_theta - a_z / g,
+            d_a, d_e, d_r, d_t, w_n * FT, w_e * FT, w_d * FT,
+        )  # fmt: skip
