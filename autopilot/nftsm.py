@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Annotated
 
@@ -10,7 +11,7 @@ from annotated_types import Ge, Gt, Lt
 from autopilot.angles import sig
 from autopilot.guidance import Step
 from autopilot.quantities import About
-from autopilot.standoff import RelativeMotion, StandoffLaw, standoff_step
+from autopilot.standoff import Motion, StandoffLaw, standoff_step
 
 _TABLE_2 = {"alpha3": 0.2, "eta": 0.001, "beta3": 2.0 / 3.0, "k1": 0.05, "k2": 12.0, "k3": 6.0, "gamma1": 0.9}
 GAIN_SETS = MappingProxyType(
@@ -39,7 +40,7 @@ class Nftsm(StandoffLaw):
     gamma1: Annotated[float, Gt(0), Lt(1), About("power of the reaching law, Eq. (18)")]
 
     def start(self) -> Step:
-        return standoff_step(self, lambda motion: command(self, motion))
+        return standoff_step(self, partial(command, self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """What Definition 5, Eq. (28) and Eq. (30) ask for and these gains break, one sentence each."""
@@ -60,31 +61,25 @@ class Nftsm(StandoffLaw):
         return broken
 
 
-def sigma(x: float, beta3: float, eta: float) -> float:
-    """The smoothed terminal term of Definition 5."""
-    if abs(x) > eta:
-        return sig(x, beta3)
-    r1 = (2.0 - beta3) * eta ** (beta3 - 1.0)
+def sigma(x: float, beta3: float, eta: float) -> tuple[float, float]:
+    """The smoothed terminal term of Definition 5, and its slope: r1 + 2 r2 |x| inside, where Eq. (16) prints x."""
+    size = abs(x)
+    if size > eta:
+        power = size ** (beta3 - 1.0)
+        return power * x, beta3 * power
     r2 = (beta3 - 1.0) * eta ** (beta3 - 2.0)
-    return r1 * x + r2 * abs(x) * x
-
-
-def sigma_slope(x: float, beta3: float, eta: float) -> float:
-    """The derivative of `sigma`: r1 + 2 r2 |x| inside, where the paper prints r1 + 2 r2 x."""
-    if abs(x) > eta:
-        return beta3 * math.pow(abs(x), beta3 - 1.0)
     r1 = (2.0 - beta3) * eta ** (beta3 - 1.0)
-    r2 = (beta3 - 1.0) * eta ** (beta3 - 2.0)
-    return r1 + 2.0 * r2 * abs(x)
+    return (r1 + r2 * size) * x, r1 + 2.0 * r2 * size
 
 
-def command(g: Nftsm, m: RelativeMotion) -> tuple[float, float, float]:
+def command(g: Nftsm, motion: Motion) -> tuple[float, float, float]:
     """Eq. (17)-(19): (feed-forward, rest of the command, s), in rad/s, rad/s and rad; unlimited."""
-    k1_r = g.k1 * m.r
+    r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
+    k1_r = g.k1 * r
     ell = math.atan(k1_r)
-    s = m.psi_a_err + g.alpha2 * sig(ell, g.beta2) + g.alpha3 * sigma(ell, g.beta3, g.eta)  # Eq. (17)
-    fast_slope = g.alpha2 * g.beta2 * math.pow(max(abs(ell), _SMALLEST_ELL), g.beta2 - 1.0)
-    slope = fast_slope + g.alpha3 * sigma_slope(ell, g.beta3, g.eta)
-    feed_forward = m.lam_dot + m.psi_a_d_dot
-    rest = -slope * g.k1 * m.r_dot / (1.0 + k1_r * k1_r) - g.k2 * s - g.k3 * sig(s, g.gamma1)  # Eq. (19)
-    return feed_forward, rest, s
+    sigma_ell, sigma_slope = sigma(ell, g.beta3, g.eta)
+    fast = g.alpha2 * max(abs(ell), _SMALLEST_ELL) ** (g.beta2 - 1.0)  # alpha2 sig^beta2(ell) = fast ell
+    slope = g.beta2 * fast + g.alpha3 * sigma_slope  # Eq. (16)
+    s = psi_a_err + fast * ell + g.alpha3 * sigma_ell  # Eq. (17)
+    rest = -slope * g.k1 * r_dot / (1.0 + k1_r * k1_r) - g.k2 * s - g.k3 * sig(s, g.gamma1)  # Eq. (19)
+    return lam_dot + psi_a_d_dot, rest, s

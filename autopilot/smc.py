@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Annotated
 
@@ -9,7 +10,7 @@ from annotated_types import Gt
 
 from autopilot.guidance import Step
 from autopilot.quantities import About
-from autopilot.standoff import RelativeMotion, StandoffLaw, standoff_step
+from autopilot.standoff import Motion, StandoffLaw, standoff_step
 
 GAIN_SETS = MappingProxyType(
     {"paper": {"c1": 0.2, "c2": 0.05, "c3": 0.005, "epsilon": 0.2}}  # Table 2, the row labelled TSM
@@ -27,17 +28,18 @@ class Smc(StandoffLaw):
     epsilon: Annotated[float, Gt(0), About("rad: half width of the boundary layer, Eq. (35)")]
 
     def start(self) -> Step:
-        return standoff_step(self, lambda motion: command(self, motion))
+        return standoff_step(self, partial(command, self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """The paper asks for positive gains only, which the fields hold."""
         return []
 
 
-def command(g: Smc, m: RelativeMotion) -> tuple[float, float, float]:
+def command(g: Smc, motion: Motion) -> tuple[float, float, float]:
     """Eq. (34)-(35): (feed-forward, rest of the command, s), in rad/s, rad/s and rad; unlimited."""
-    c2_r = g.c2 * m.r
-    s = m.psi_a_err + g.c1 * math.atan(c2_r)  # Eq. (34)
-    feed_forward = m.lam_dot + m.psi_a_d_dot
+    r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
+    c2_r = g.c2 * r
+    s = psi_a_err + g.c1 * math.atan(c2_r)  # Eq. (34)
     sat = max(-1.0, min(1.0, s / g.epsilon))
-    return feed_forward, -g.c1 * g.c2 * m.r_dot / (1.0 + c2_r * c2_r) - g.c3 * sat, s  # Eq. (35)
+    rest = -g.c1 * g.c2 * r_dot / (1.0 + c2_r * c2_r) - g.c3 * sat  # Eq. (35)
+    return lam_dot + psi_a_d_dot, rest, s

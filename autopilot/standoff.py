@@ -4,10 +4,10 @@ Symbols are the paper's: L distance, R_d standoff distance, r range error, theta
 target, lam = theta - pi/2; a bar is an angle minus lam. Pure functions of floats, finite for finite arguments.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from math import asin, atan2, copysign, cos, hypot, pi, radians, sin, sqrt
+from typing import Annotated, Literal
 
 from annotated_types import Gt
 
@@ -15,72 +15,62 @@ from autopilot.angles import wrap
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.quantities import About, DegreesPerSecond, Metres
 
-_CLOSEST = 1e-6  # m: below this distance the azimuth has no meaning, and its rate is bounded by this distance
-_SLOWEST = 1e-6  # m/s: below this speed the target has no direction
+_CLOSEST = 1e-6  # m: nearer than this the azimuth has no meaning, and its rate is bounded by it
 
 
-class RelativeMotion(NamedTuple):
-    """Where the aircraft stands with respect to the circle. SI, rad."""
-
-    r: float
-    r_dot: float
-    lam_dot: float
-    psi_a_err: float  # heading error, [-pi, pi)
-    psi_a_d_dot: float  # rate of the desired bar psi_a
+Motion = tuple[float, float, float, float, float]  # r, its rate, rate of lam, heading error, rate of the desired bar psi_a
 
 
-def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> RelativeMotion:
-    """Eq. (5), (7), (20), as corrected in `docs/errata.md`, for airspeed `v_a` and heading `psi_a`.
+def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Motion:
+    """Eq. (5), (7), (20), as corrected in `docs/errata.md`, for airspeed `v_a` and heading `psi_a`. SI, rad.
 
     With lam = theta - pi/2, v sin(psi - lam) is the velocity away from the target and v cos(psi - lam) the one along lam.
     """
     x_r = o.north - o.target_north
     y_r = o.east - o.target_east
-    L = math.hypot(x_r, y_r)
-    lam = math.atan2(y_r, x_r) - math.pi / 2.0
-    cos_lam, sin_lam = math.cos(lam), math.sin(lam)
+    L = sqrt(x_r * x_r + y_r * y_r)
+    lam = atan2(y_r, x_r) - 0.5 * pi
+    cos_lam, sin_lam = cos(lam), sin(lam)
     v_t_x, v_t_y = o.target_velocity_north, o.target_velocity_east
-    v_t_sin = v_t_y * cos_lam - v_t_x * sin_lam  # v_t sin(bar psi_t)
-    v_t_cos = v_t_x * cos_lam + v_t_y * sin_lam
     W_x, W_y = o.wind_north, o.wind_east
-    v_w_sin = W_y * cos_lam - W_x * sin_lam
-    v_w_cos = W_x * cos_lam + W_y * sin_lam
+    v_t_sin, v_t_cos = v_t_y * cos_lam - v_t_x * sin_lam, v_t_x * cos_lam + v_t_y * sin_lam  # v_t sin, cos(bar psi_t)
+    v_w_sin, v_w_cos = W_y * cos_lam - W_x * sin_lam, W_x * cos_lam + W_y * sin_lam
     bar_psi_a = psi_a - lam
 
-    r_dot = v_a * math.sin(bar_psi_a) - v_t_sin + v_w_sin  # Eq. (5)
-    lam_dot = (-v_a * math.cos(bar_psi_a) + v_t_cos - v_w_cos) / max(L, _CLOSEST)  # Eq. (5), second line
+    r_dot = v_a * sin(bar_psi_a) - v_t_sin + v_w_sin  # Eq. (5)
+    lam_dot = (-v_a * cos(bar_psi_a) + v_t_cos - v_w_cos) / max(L, _CLOSEST)  # Eq. (5), second line
     across = v_t_sin - v_w_sin
     if abs(across) < v_a:
-        bar_psi_a_d = math.asin(across / v_a)  # Eq. (7)
+        bar_psi_a_d = asin(across / v_a)  # Eq. (7)
         across_dot = v_t_cos * (o.target_turn_rate - lam_dot) + v_w_cos * lam_dot
         if o.target_acceleration:
-            across_dot += o.target_acceleration * v_t_sin / max(math.hypot(v_t_x, v_t_y), _SLOWEST)
-        psi_a_d_dot = across_dot / math.sqrt(v_a * v_a - across * across)  # Eq. (20)
+            across_dot += o.target_acceleration * v_t_sin / (hypot(v_t_x, v_t_y) or 1.0)
+        psi_a_d_dot = across_dot / sqrt(v_a * v_a - across * across)  # Eq. (20)
     else:  # Remark 1 is broken: no heading keeps the distance; the nearest one is held
-        bar_psi_a_d = math.copysign(math.pi / 2.0, across)
+        bar_psi_a_d = copysign(0.5 * pi, across)
         psi_a_d_dot = 0.0
-    return RelativeMotion(L - R_d, r_dot, lam_dot, wrap(bar_psi_a - bar_psi_a_d), psi_a_d_dot)
+    return L - R_d, r_dot, lam_dot, wrap(bar_psi_a - bar_psi_a_d), psi_a_d_dot
 
 
 def course_rate_ratio(v_a: float, psi_a: float, W_x: float, W_y: float) -> float:
     """L(psi_a) of Eq. (3): the course rate over the heading rate, for |wind| < v_a. Above 1/2; above 1 in a headwind."""
-    along = v_a * (W_x * math.cos(psi_a) + W_y * math.sin(psi_a))
+    along = v_a * (W_x * cos(psi_a) + W_y * sin(psi_a))
     return (v_a * v_a + along) / (v_a * v_a + W_x * W_x + W_y * W_y + 2.0 * along)
 
 
 def ground_speed(v_a: float, chi_a: float, W_x: float, W_y: float) -> float:
     """v_g from the airspeed and the course chi_a (the relation above Eq. 3). Needs |wind| < v_a."""
-    across = W_x * math.sin(chi_a) - W_y * math.cos(chi_a)
-    return W_x * math.cos(chi_a) + W_y * math.sin(chi_a) + math.sqrt(v_a * v_a - across * across)
+    across = W_x * sin(chi_a) - W_y * cos(chi_a)
+    return W_x * cos(chi_a) + W_y * sin(chi_a) + sqrt(v_a * v_a - across * across)
 
 
 def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> float:
     """psi_a from the course: what a small UAV without air data knows. A crosswind beyond v_a counts as v_a."""
-    across = (W_x * math.sin(chi_a) - W_y * math.cos(chi_a)) / v_a
-    return wrap(chi_a + math.asin(max(-1.0, min(1.0, across))))
+    across = (W_x * sin(chi_a) - W_y * cos(chi_a)) / v_a
+    return wrap(chi_a + asin(max(-1.0, min(1.0, across))))
 
 
-Reaching = Callable[[RelativeMotion], tuple[float, float, float]]
+Reaching = Callable[[Motion], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +78,7 @@ class StandoffLaw:
     """What every standoff law has: the circle, the limit, and how the command is given."""
 
     standoff: Annotated[Metres, Gt(0), About("desired distance to the target, R_d")] = 200.0
-    max_heading_rate: Annotated[DegreesPerSecond, Gt(0), About("limit of the command, Eq. (2)")] = math.radians(5.0)
+    max_heading_rate: Annotated[DegreesPerSecond, Gt(0), About("limit of the command, Eq. (2)")] = radians(5.0)
     direction: Annotated[
         Literal["paper", "mirrored"], About("way round: the paper's goes anticlockwise on a map, mirrored clockwise")
     ] = "paper"
@@ -102,21 +92,22 @@ class StandoffLaw:
 def standoff_step(law: StandoffLaw, reach: Reaching) -> Step:
     """The law in flight: `reach` gives (feed-forward, rest of the command, s) for the paper's way round."""
 
+    R_d, max_rate = law.standoff, law.max_heading_rate
+    measured, by_course = law.airspeed == "measured", law.command == "course_rate"
+
     def step(o: Observation) -> Guidance:
-        v_a = o.nominal_airspeed if law.airspeed == "nominal" else max(o.airspeed, 1e-3)
-        if law.command == "heading_rate":
-            psi_a, ratio = o.heading, 1.0
-        else:
-            chi_a = math.atan2(o.velocity_east, o.velocity_north)
-            psi_a = heading_from_course(v_a, chi_a, o.wind_north, o.wind_east)
-            flyable = math.hypot(o.wind_north, o.wind_east) < v_a
-            ratio = course_rate_ratio(v_a, psi_a, o.wind_north, o.wind_east) if flyable else 1.0
-        motion = relative_motion(o, law.standoff, v_a, psi_a)
+        v_a = max(o.airspeed, 1e-3) if measured else o.nominal_airspeed
+        psi_a, limit = o.heading, max_rate
+        if by_course:
+            W_x, W_y = o.wind_north, o.wind_east
+            psi_a = heading_from_course(v_a, atan2(o.velocity_east, o.velocity_north), W_x, W_y)
+            if hypot(W_x, W_y) < v_a:
+                limit = max_rate / course_rate_ratio(v_a, psi_a, W_x, W_y)  # |u_chi| <= max_rate, Eq. (3)
+        motion = relative_motion(o, R_d, v_a, psi_a)
         feed_forward, rest, s = reach(motion)
         unlimited = feed_forward + rest
-        limit = law.max_heading_rate / ratio  # |u_chi| = |ratio * omega_psi| <= limit, Eq. (3)
         return Guidance(
-            max(-limit, min(limit, unlimited)), motion.r, s, motion.psi_a_err, feed_forward, unlimited
+            max(-limit, min(limit, unlimited)), motion[0], s, motion[3], feed_forward, unlimited
         )
 
     return step if law.direction == "paper" else lambda o: _mirror_guidance(step(_mirror_observation(o)))

@@ -9,6 +9,9 @@ from harness.state import State
 from harness.wind import Wind
 
 
+_NO_AIRFRAME = State(*(math.nan,) * len(State._fields))[9:-3]  # from bank to throttle
+
+
 @dataclass(frozen=True, slots=True)
 class Kinematic:
     """Eq. (1). Between commands the motion is exact: a circular arc in the air, carried by the wind."""
@@ -36,15 +39,6 @@ class _KinematicFlying:
         v_a = self._airspeed
         W_x, W_y = self._wind
         return State(
-            north=x,
-            east=y,
-            altitude=self._altitude,
-            velocity_north=v_a * math.cos(psi) + W_x,
-            velocity_east=v_a * math.sin(psi) + W_y,
-            velocity_down=0.0,
-            airspeed=v_a,
-            heading=psi,
-            heading_rate=heading_rate,
-            wind_north=W_x,
-            wind_east=W_y,
-        )
+            x, y, self._altitude, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, 0.0, v_a, psi, heading_rate,
+            *_NO_AIRFRAME, W_x, W_y, 0.0,
+        )  # fmt: skip

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import jsbsim
 import numpy as np
+from numpy.typing import NDArray
 
 import aircraft
 import autopilot
@@ -17,6 +18,8 @@ from harness.state import State
 from harness.wind import Wind
 
 FT = 0.3048  # m
+SLUG = 4.4482216152605 / FT  # kg
+RADIUS = 6371000.0  # m, as in planet.xml
 GROUND = 15.0  # m: below this height the flight has ended
 DEPARTURE_BANK = math.radians(80.0)
 STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
@@ -123,11 +126,13 @@ def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> None:
     write(fdm, "ic/vn-fps", (start.airspeed * math.cos(start.heading) + W_x) / FT)
     write(fdm, "ic/ve-fps", (start.airspeed * math.sin(start.heading) + W_y) / FT)
     write(fdm, "ic/vd-fps", 0.0)
+    ahead = start.airspeed + W_x * math.cos(start.heading) + W_y * math.sin(start.heading)
+    write(fdm, "ic/q-rad_sec", -ahead / RADIUS)  # level on a sphere is turning down with it
     write(fdm, "actuators/engaged", 0.0)
     write(fdm, "inner-loop/engaged", 0.0)
 
 
-def _accelerations(fdm: jsbsim.FGFDMExec, x: np.ndarray) -> np.ndarray:
+def _accelerations(fdm: jsbsim.FGFDMExec, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """(u', w', q') in m/s^2, m/s^2, rad/s^2 at pitch, elevator, throttle `x`."""
     fdm["ic/theta-rad"] = x[0]
     fdm["fcs/elevator-pos-rad"] = x[1]
@@ -145,7 +150,8 @@ def _accelerations(fdm: jsbsim.FGFDMExec, x: np.ndarray) -> np.ndarray:
 def engage(fdm: jsbsim.FGFDMExec, trimmed: Trim, start: Start, rate_trim: bool) -> None:
     """Hands the trimmed aircraft to its inner loop, which holds this altitude and airspeed."""
     write(fdm, "inner-loop/trim/pitch-rad", trimmed.pitch)
-    write(fdm, "inner-loop/trim/elevator-rad", trimmed.elevator)
+    damping = fdm["inner-loop/gain/pitch-rate"] * fdm["velocities/q-rad_sec"]  # of the turn down with the sphere
+    write(fdm, "inner-loop/trim/elevator-rad", trimmed.elevator - damping)
     write(fdm, "inner-loop/trim/throttle-norm", trimmed.throttle)
     write(fdm, "inner-loop/command/altitude-m", start.altitude)
     write(fdm, "inner-loop/command/airspeed-mps", start.airspeed)
@@ -227,7 +233,11 @@ class _SixDofFlying:
         for _ in range(round(period / self._step)):
             run()
         self.state = state = self._read()
-        if not state.altitude > GROUND or not abs(state.bank) < DEPARTURE_BANK or not state.angle_of_attack < self._stall:
+        if (
+            not state.altitude > GROUND
+            or not abs(state.bank) < DEPARTURE_BANK
+            or not state.angle_of_attack < self._stall
+        ):
             self._judge(state, period)
         else:
             self._stalled_for = 0.0
@@ -267,3 +277,57 @@ class _SixDofFlying:
             a_y - g * sin_phi * cos_theta, cos_phi * cos_theta - a_z / g,
             d_a, d_e, d_r, d_t, w_n * FT, w_e * FT, w_d * FT,
         )  # fmt: skip
+
+
+def wind_triangle_error(airframe: Path, start: Start, wind: Wind) -> float:
+    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air by the attitude from body axes."""
+    fdm = load(airframe, 0.005)
+    engage(fdm, trim(fdm, start, wind), start, rate_trim=True)
+    for _ in range(400):
+        fdm.run()
+    phi, theta, psi = (fdm[f"attitude/{angle}-rad"] for angle in ("phi", "theta", "psi"))
+    air = _body_to_ned(phi, theta, psi) @ [fdm[f"velocities/{axis}-aero-fps"] for axis in "uvw"]
+    ground = [fdm[f"velocities/v-{axis}-fps"] for axis in ("north", "east", "down")]
+    return float(np.abs(FT * (np.array(ground) - air) - [*wind.steady, 0.0]).max())
+
+
+def _body_to_ned(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
+    """The direction cosine matrix C_nb of the Euler angles (Stevens & Lewis, Eq. 1.3-20, transposed)."""
+    s_f, c_f, s_t, c_t, s_p, c_p = (f(x) for x in (phi, theta, psi) for f in (math.sin, math.cos))
+    return np.array(
+        [
+            [c_t * c_p, s_f * s_t * c_p - c_f * s_p, c_f * s_t * c_p + s_f * s_p],
+            [c_t * s_p, s_f * s_t * s_p + c_f * c_p, c_f * s_t * s_p - s_f * c_p],
+            [-s_t, s_f * c_t, c_f * c_t],
+        ]
+    )
+
+
+class UnitCheck(NamedTuple):
+    """One quantity in SI: as the airframe's data have it, and as JSBSim keeps it in other units."""
+
+    what: str
+    data: float
+    jsbsim: float
+
+
+def compare_units(airframe: Path) -> list[UnitCheck]:
+    """Mass, inertia, geometry, airspeed and altitude of a trimmed airframe, each by both."""
+    data = aircraft.data(airframe)
+    mass, ref = data["mass"], data["ref"]
+    fdm = load(airframe, 0.005)
+    start = Start(airspeed=float(data["envelope"]["V_design"]["v"]))
+    trim(fdm, start, Wind())
+    return [
+        UnitCheck(*row)
+        for row in (
+            ("mass kg", mass["m"]["v"], SLUG * fdm["inertia/mass-slugs"]),
+            ("Ixx kg m2", mass["Ixx"]["v"], SLUG * FT**2 * fdm["inertia/ixx-slugs_ft2"]),
+            ("Ixz kg m2", mass["Ixz"]["v"], -SLUG * FT**2 * fdm["inertia/ixz-slugs_ft2"]),
+            ("wing area m2", ref["S"]["v"], FT**2 * fdm["metrics/Sw-sqft"]),
+            ("span m", ref["b"]["v"], FT * fdm["metrics/bw-ft"]),
+            ("chord m", ref["c"]["v"], FT * fdm["metrics/cbarw-ft"]),
+            ("airspeed m/s", start.airspeed, FT * fdm["velocities/vt-fps"]),
+            ("altitude m", start.altitude, FT * fdm["position/h-sl-ft"]),
+        )
+    ]

@@ -1,6 +1,7 @@
 """The one loop: target, observation, guidance law, plant."""
 
 import math
+from array import array
 
 import numpy as np
 
@@ -20,39 +21,28 @@ def simulate(flight: Flight) -> FlightLog:
     law = flight.law.start()
     flying = plant_of(flight).start(flight.start, flight.wind)
     period, last = flight.guidance_period, flight.periods
-    rows: list[tuple[float, ...]] = []
+    rows = array("d")
     outcome, reason = Outcome.COMPLETED, ""
     try:
         for k in range(last + 1):
             state = flying.state
             seen = target(k * period)
             guidance = _command(law, _observe(flight, state, seen))
-            rows.append((k * period, *state, *seen, *guidance))
+            rows.extend((k * period, *state, *seen, *guidance))
             _keep_in_sight(flight, guidance.range_error)
             if k < last:
                 flying.advance(guidance.heading_rate, period)
     except End as end:
         outcome, reason = end.outcome, str(end)
-    return FlightLog(flight, outcome, reason, np.array(rows, dtype=np.float64).reshape(-1, len(COLUMNS)))
+    return FlightLog(flight, outcome, reason, np.frombuffer(rows).reshape(-1, len(COLUMNS)))
 
 
 def _observe(flight: Flight, state: State, seen: TargetState) -> Observation:
-    wind_north, wind_east = flight.wind.steady
+    start = flight.start
     return Observation(
-        state.north,
-        state.east,
-        state.velocity_north,
-        state.velocity_east,
-        state.airspeed,
-        flight.start.airspeed,
-        state.heading,
-        state.heading_rate,
-        state.bank,
-        state.roll_rate,
-        wind_north,
-        wind_east,
-        *seen,
-    )
+        state.north, state.east, state.velocity_north, state.velocity_east, state.airspeed, start.airspeed,
+        state.heading, state.heading_rate, state.bank, state.roll_rate, *flight.wind.steady, *seen,
+    )  # fmt: skip
 
 
 def _command(law: Step, observation: Observation) -> Guidance:

@@ -1,0 +1,28 @@
+"""Flies a guidance law on a kinematic and on a 6-DOF aircraft, and measures whether coordinated flight holds.
+
+`load_flight(path)` reads a flight, `simulate(flight)` flies it, `read_flight(path)` reads a recording back.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from harness.recording import read_recording as read_flight
+    from harness.settings import load_flight
+    from harness.simulation import simulate
+
+__all__ = ["load_flight", "read_flight", "simulate"]
+
+_HOME = {
+    "load_flight": ("harness.settings", "load_flight"),
+    "read_flight": ("harness.recording", "read_recording"),
+    "simulate": ("harness.simulation", "simulate"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Loads a public name when it is first asked for: `harness --help` needs none of them."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'harness' has no attribute {name!r}")
+    module, attribute = _HOME[name]
+    return getattr(import_module(module), attribute)

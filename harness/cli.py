@@ -1,0 +1,48 @@
+"""The command line: `harness COMMAND`. Exit codes: 0 ok, 1 a flight failed, 2 bad input, 130 interrupted."""
+
+import sys
+
+import click
+
+from harness.commands.check import check
+from harness.commands.demo import demo
+from harness.commands.doctor import doctor
+from harness.commands.fly import fly
+from harness.commands.list import list_
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="standoff-harness")
+def harness() -> None:
+    """Fly a guidance law on the kinematic aircraft it was proved on, and on a JSBSim aircraft in wind.
+
+    \b
+    Example:
+      harness fly experiments/stationary.toml --set plant=kinematic
+    """
+
+
+for command in (fly, check, list_, demo, doctor):
+    harness.add_command(command)
+
+
+class BadInput(click.ClickException):
+    """What the user gave cannot be used: its text, as it is, on stderr; exit code 2."""
+
+    exit_code = 2
+
+    def show(self, file: object = None) -> None:
+        click.echo(self.message, err=True)
+
+
+def main() -> None:
+    """The entry point."""
+    try:
+        code = harness.main(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted", err=True)
+        code = 130
+    sys.exit(code if isinstance(code, int) else 0)

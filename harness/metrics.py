@@ -1,0 +1,132 @@
+"""The numbers a flight is judged by, each from the log alone. None where the plant has no such thing."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+MEANING: Mapping[str, str] = MappingProxyType(
+    {
+        "convergence_time_s": "first time after which |range error| stays below the tolerance, 5 s of it at least",
+        "range_error_final_m": "at the end",
+        "range_error_rms_m": "over the last half",
+        "range_error_peak_m": "largest, over the last half",
+        "overshoot_m": "largest range error of the opposite sign after the first crossing",
+        "saturation_fraction": "share of the last half with the command at its limit",
+        "command_activity_deg_s2": "total variation of the command per second, last half",
+        "heading_rate_error_rms_deg_s": "flown minus commanded, both averaged over 0.25 s (-3 dB at 1.8 Hz)",
+        "heading_rate_lag_s": "delay at which the flown rate matches the commanded one best",
+        "heading_rate_gain": "flown over commanded, at that delay",
+        "turn_ratio": "flown over g tan(bank) / V",
+        "sideslip_rms_deg": "over the flight",
+        "sideslip_peak_deg": "largest",
+        "bank_peak_deg": "largest",
+        "lateral_acceleration_rms_mps2": "specific force along the wing; none in a coordinated turn",
+        "airspeed_deviation_rms_mps": "from the nominal airspeed",
+        "altitude_deviation_peak_m": "largest, from the commanded altitude",
+    }
+)
+
+SETTLED_FOR = 5.0  # s
+AVERAGED_OVER = 0.25  # s
+LONGEST_LAG = 2.0  # s
+LEAST_EXCITATION = np.radians(0.5)  # rad/s: a command, or a turn, that varies less tells nothing of lag or ratio
+GRAVITY = 9.80665
+
+
+def metrics(log: FlightLog) -> dict[str, float | None]:
+    """All metrics of a flight, by the names of `MEANING`. Units by suffix."""
+    period = log.flight.guidance_period
+    time, error, command = log["time"], log["range_error"], log["heading_rate_command"]
+    half = len(log) // 2
+    lasted = max(time[-1] - time[half], period)
+    flown = np.diff(np.unwrap(log["heading"])) / period  # mean rate while each command was held
+    held = command[:-1]
+    lag, gain = _lag_and_gain(held, flown, period)
+    unlimited = log["unlimited_command"][half:]
+    return {
+        "convergence_time_s": _settling_time(time, error, log.flight.metrics.tolerance),
+        "range_error_final_m": float(error[-1]),
+        "range_error_rms_m": _rms(error[half:]),
+        "range_error_peak_m": _peak(error[half:]),
+        "overshoot_m": _overshoot(error),
+        "saturation_fraction": float(np.mean(np.abs(command[half:]) < np.abs(unlimited))),
+        "command_activity_deg_s2": float(np.degrees(np.abs(np.diff(command[half:])).sum() / lasted)),
+        "heading_rate_error_rms_deg_s": _degrees(_rms(_averaged(flown - held, AVERAGED_OVER / period))),
+        "heading_rate_lag_s": lag,
+        "heading_rate_gain": gain,
+        "turn_ratio": _turn_ratio(log),
+        "sideslip_rms_deg": _degrees(_rms(log["sideslip"])),
+        "sideslip_peak_deg": _degrees(_peak(log["sideslip"])),
+        "bank_peak_deg": _degrees(_peak(log["bank"])),
+        "lateral_acceleration_rms_mps2": _rms(log["lateral_acceleration"]),
+        "airspeed_deviation_rms_mps": _rms(log["airspeed"] - log.flight.start.airspeed),
+        "altitude_deviation_peak_m": _peak(log["altitude"] - log.flight.start.altitude),
+    }
+
+
+def _settling_time(time: Array, error: Array, tolerance: float) -> float | None:
+    outside = np.flatnonzero(~(np.abs(error) < tolerance))
+    first = outside[-1] + 1 if outside.size else 0
+    if first >= len(time) or time[-1] - time[first] < SETTLED_FOR:
+        return None
+    return float(time[first])
+
+
+def _overshoot(error: Array) -> float | None:
+    """None when the error never changes sign: there was nothing to overshoot."""
+    crossed = np.flatnonzero(error * error[0] < 0)
+    return float(np.abs(error[crossed]).max()) if crossed.size else None
+
+
+def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | None, float | None]:
+    """The delay of largest correlation, to a fraction of a period, and the ratio there by least squares."""
+    if len(command) < 2 or np.std(command) < LEAST_EXCITATION:
+        return None, None
+    longest = min(round(LONGEST_LAG / period), len(command) // 2)
+    likeness = np.array([_correlation(command[: len(command) - n], flown[n:]) for n in range(longest + 1)])
+    n = int(np.argmax(likeness))
+    lag = n + (_vertex(likeness[n - 1 : n + 2]) if 0 < n < longest else 0.0)
+    u, y = command[: len(command) - n], flown[n:]
+    return float(lag * period), float(u @ y / (u @ u))
+
+
+def _correlation(a: Array, b: Array) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    return float(a @ b / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
+
+
+def _vertex(y: Array) -> float:
+    """Where the parabola through three neighbours has its top, from the middle one."""
+    bend = y[0] - 2.0 * y[1] + y[2]
+    return float(0.5 * (y[0] - y[2]) / bend) if bend else 0.0
+
+
+def _turn_ratio(log: FlightLog) -> float | None:
+    coordinated = GRAVITY * np.tan(log["bank"]) / log["airspeed"]
+    if not _rms(coordinated) or (_rms(coordinated) or 0.0) < LEAST_EXCITATION:
+        return None
+    return float(coordinated @ log["heading_rate"] / (coordinated @ coordinated))
+
+
+def _averaged(x: Array, samples: float) -> Array:
+    """A centred moving average: it delays nothing."""
+    window = np.ones(max(1, round(samples)))
+    return np.convolve(x, window / window.size, mode="valid") if len(x) >= window.size else x
+
+
+def _rms(x: Array) -> float | None:
+    return float(np.sqrt(np.mean(x * x))) if len(x) and np.isfinite(x).all() else None
+
+
+def _peak(x: Array) -> float | None:
+    return float(np.abs(x).max()) if len(x) and np.isfinite(x).all() else None
+
+
+def _degrees(x: float | None) -> float | None:
+    return None if x is None else float(np.degrees(x))
