@@ -1,8 +1,7 @@
 """The paper's law: nonsingular fast terminal sliding mode guidance, Eq. (15)-(20)."""
 
-import math
 from dataclasses import dataclass
-from functools import partial
+from math import asin, atan, pi
 from types import MappingProxyType
 from typing import Annotated
 
@@ -11,7 +10,7 @@ from annotated_types import Ge, Gt, Lt
 from autopilot.angles import sig
 from autopilot.guidance import Step
 from autopilot.quantities import About
-from autopilot.standoff import Motion, StandoffLaw, standoff_step
+from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
 
 _TABLE_2 = {"alpha3": 0.2, "eta": 0.001, "beta3": 2.0 / 3.0, "k1": 0.05, "k2": 12.0, "k3": 6.0, "gamma1": 0.9}
 GAIN_SETS = MappingProxyType(
@@ -40,7 +39,7 @@ class Nftsm(StandoffLaw):
     gamma1: Annotated[float, Gt(0), Lt(1), About("power of the reaching law, Eq. (18)")]
 
     def start(self) -> Step:
-        return standoff_step(self, partial(command, self))
+        return standoff_step(self, reaching(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """What Definition 5, Eq. (28) and Eq. (30) ask for and these gains break, one sentence each."""
@@ -49,11 +48,11 @@ class Nftsm(StandoffLaw):
             broken.append(
                 f"beta2 = {self.beta2:g} is below 1 (Definition 5): the law is singular on the circle, at ell = 0"
             )
-        reach = self.alpha2 * (math.pi / 2) ** self.beta2 + self.alpha3 * (math.pi / 2) ** self.beta3
-        if reach > math.pi:
+        reach = self.alpha2 * (pi / 2) ** self.beta2 + self.alpha3 * (pi / 2) ** self.beta3
+        if reach > pi:
             broken.append(f"Eq. (28): alpha2 (pi/2)^beta2 + alpha3 (pi/2)^beta3 = {reach:.3g} exceeds pi")
-        xi = math.asin(min(1.0, speed_ratio))
-        if xi + reach >= math.pi / 2:
+        xi = asin(min(1.0, speed_ratio))
+        if xi + reach >= pi / 2:
             broken.append(
                 f"Eq. (30): arcsin((v_t + v_w)/v_a) + {reach:.3g} = {xi + reach:.3g} is not below pi/2: "
                 "on the manifold the aircraft may fly away from the circle"
@@ -72,14 +71,20 @@ def sigma(x: float, beta3: float, eta: float) -> tuple[float, float]:
     return (r1 + r2 * size) * x, r1 + 2.0 * r2 * size
 
 
-def command(g: Nftsm, motion: Motion) -> tuple[float, float, float]:
-    """Eq. (17)-(19): (feed-forward, rest of the command, s), in rad/s, rad/s and rad; unlimited."""
-    r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
-    k1_r = g.k1 * r
-    ell = math.atan(k1_r)
-    sigma_ell, sigma_slope = sigma(ell, g.beta3, g.eta)
-    fast = g.alpha2 * max(abs(ell), _SMALLEST_ELL) ** (g.beta2 - 1.0)  # alpha2 sig^beta2(ell) = fast ell
-    slope = g.beta2 * fast + g.alpha3 * sigma_slope  # Eq. (16)
-    s = psi_a_err + fast * ell + g.alpha3 * sigma_ell  # Eq. (17)
-    rest = -slope * g.k1 * r_dot / (1.0 + k1_r * k1_r) - g.k2 * s - g.k3 * sig(s, g.gamma1)  # Eq. (19)
-    return lam_dot + psi_a_d_dot, rest, s
+def reaching(g: Nftsm) -> Reaching:
+    """Eq. (17)-(19) with these gains, unlimited: (feed-forward, rest of the command, s) in rad/s, rad/s, rad."""
+    alpha2, alpha3, beta2, beta3, eta = g.alpha2, g.alpha3, g.beta2, g.beta3, g.eta
+    k1, k2, k3, gamma1 = g.k1, g.k2, g.k3, g.gamma1
+
+    def reach(motion: Motion) -> tuple[float, float, float]:
+        r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
+        k1_r = k1 * r
+        ell = atan(k1_r)
+        sigma_ell, sigma_slope = sigma(ell, beta3, eta)
+        fast = alpha2 * max(abs(ell), _SMALLEST_ELL) ** (beta2 - 1.0)  # alpha2 sig^beta2(ell) = fast ell
+        slope = beta2 * fast + alpha3 * sigma_slope  # Eq. (16)
+        s = psi_a_err + fast * ell + alpha3 * sigma_ell  # Eq. (17)
+        rest = -slope * k1 * r_dot / (1.0 + k1_r * k1_r) - k2 * s - k3 * sig(s, gamma1)  # Eq. (19)
+        return lam_dot + psi_a_d_dot, rest, s
+
+    return reach

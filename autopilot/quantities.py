@@ -24,6 +24,11 @@ class About:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class Unlimited:
+    """The field may be infinite: `inf` in a file."""
+
+
 Seconds = Annotated[float, Unit("s", 1.0)]
 Metres = Annotated[float, Unit("m", 1.0)]
 MetresPerSecond = Annotated[float, Unit("mps", 1.0)]

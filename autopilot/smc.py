@@ -1,8 +1,7 @@
 """The law the paper compares with: sliding mode control with a linear-arctan manifold, Eq. (34)-(35)."""
 
-import math
 from dataclasses import dataclass
-from functools import partial
+from math import atan
 from types import MappingProxyType
 from typing import Annotated
 
@@ -10,7 +9,7 @@ from annotated_types import Gt
 
 from autopilot.guidance import Step
 from autopilot.quantities import About
-from autopilot.standoff import Motion, StandoffLaw, standoff_step
+from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
 
 GAIN_SETS = MappingProxyType(
     {"paper": {"c1": 0.2, "c2": 0.05, "c3": 0.005, "epsilon": 0.2}}  # Table 2, the row labelled TSM
@@ -28,18 +27,23 @@ class Smc(StandoffLaw):
     epsilon: Annotated[float, Gt(0), About("rad: half width of the boundary layer, Eq. (35)")]
 
     def start(self) -> Step:
-        return standoff_step(self, partial(command, self))
+        return standoff_step(self, reaching(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """The paper asks for positive gains only, which the fields hold."""
         return []
 
 
-def command(g: Smc, motion: Motion) -> tuple[float, float, float]:
-    """Eq. (34)-(35): (feed-forward, rest of the command, s), in rad/s, rad/s and rad; unlimited."""
-    r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
-    c2_r = g.c2 * r
-    s = psi_a_err + g.c1 * math.atan(c2_r)  # Eq. (34)
-    sat = max(-1.0, min(1.0, s / g.epsilon))
-    rest = -g.c1 * g.c2 * r_dot / (1.0 + c2_r * c2_r) - g.c3 * sat  # Eq. (35)
-    return lam_dot + psi_a_d_dot, rest, s
+def reaching(g: Smc) -> Reaching:
+    """Eq. (34)-(35) with these gains, unlimited: (feed-forward, rest of the command, s) in rad/s, rad/s, rad."""
+    c1, c2, c3, epsilon = g.c1, g.c2, g.c3, g.epsilon
+
+    def reach(motion: Motion) -> tuple[float, float, float]:
+        r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
+        c2_r = c2 * r
+        s = psi_a_err + c1 * atan(c2_r)  # Eq. (34)
+        sat = max(-1.0, min(1.0, s / epsilon))
+        rest = -c1 * c2 * r_dot / (1.0 + c2_r * c2_r) - c3 * sat  # Eq. (35)
+        return lam_dot + psi_a_d_dot, rest, s
+
+    return reach

@@ -26,15 +26,6 @@ for command in (fly, check, list_, demo, doctor):
     harness.add_command(command)
 
 
-class BadInput(click.ClickException):
-    """What the user gave cannot be used: its text, as it is, on stderr; exit code 2."""
-
-    exit_code = 2
-
-    def show(self, file: object = None) -> None:
-        click.echo(self.message, err=True)
-
-
 def main() -> None:
     """The entry point."""
     try:

@@ -5,6 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from harness.commands.telling import number
 from harness.flight import Flight, feasibility_margin
 from harness.flight_log import FlightLog
 from harness.metrics import metrics
@@ -86,13 +87,6 @@ def notes(flown: list[Flown]) -> str:
     for name in flown[0].metrics:
         lines.append(f"| {name} | " + " | ".join(number(f.metrics[name]) for f in flown) + " |")
     return "\n".join(lines)
-
-
-def number(value: float | None) -> str:
-    """Three significant digits, or a dash for none."""
-    if value is None:
-        return "-"
-    return f"{value:.3g}" if abs(value) >= 0.0005 else "0"
 
 
 def differences(flown: list[Flown]) -> list[str]:

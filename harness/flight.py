@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Annotated, Literal, NamedTuple
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Le
 
 import aircraft
 from autopilot.quantities import About, Metres, Seconds
@@ -44,9 +45,9 @@ class Flight:
     plant: Annotated[Literal["kinematic", "sixdof"], About("everything below the heading-rate command")]
     law: StandoffLaw
     aircraft: Annotated[str, About("an airframe by name, or its folder")] = "ultra_stick_25e"
-    duration: Annotated[Seconds, Gt(0), About("length of the flight")] = 100.0
-    guidance_period: Annotated[Seconds, Gt(0), About("the law's command is held in between")] = 0.05
-    step: Annotated[Seconds, Gt(0), About("of the 6-DOF simulation; periods are whole multiples of it")] = 0.005
+    duration: Annotated[Seconds, Gt(0), Le(1e6), About("length of the flight")] = 100.0
+    guidance_period: Annotated[Seconds, Gt(0), Le(1e3), About("the law's command is held in between")] = 0.05
+    step: Annotated[Seconds, Ge(1e-5), Le(0.05), About("of the 6-DOF simulation; periods are whole multiples of it")] = 0.005
     seed: Annotated[int, Ge(0), About("of everything random")] = 0
     start: Start = field(default_factory=Start)
     target: Target = field(default_factory=Target)
@@ -81,11 +82,12 @@ def problems(flight: Flight) -> list[Problem]:
     """What makes the flight impossible as it is set, beyond what each field says of itself; empty when it can start."""
     found = []
     for name, period, unit_name, unit in (
-        ("guidance_period", flight.guidance_period, "step", flight.step),
-        ("duration", flight.duration, "guidance_period", flight.guidance_period),
+        ("guidance_period", flight.guidance_period, "step_s", flight.step),
+        ("duration", flight.duration, "guidance_period_s", flight.guidance_period),
     ):
         if not _is_multiple(period, unit):
             found.append(Problem(name, f"{period:g} s is no whole multiple of {unit_name}, {unit:g} s"))
+            break
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:
         found.append(
@@ -101,8 +103,11 @@ def problems(flight: Flight) -> list[Problem]:
         found.append(Problem("target.segments", f"slow the target down to {slowest:g} m/s, must stay at or above 0"))
     try:
         aircraft.folder(flight.aircraft)
-    except FileNotFoundError:
-        found.append(Problem("aircraft", f"{flight.aircraft!r}, allowed: {', '.join(aircraft.names())}, or a folder"))
+    except OSError:
+        near = get_close_matches(flight.aircraft, aircraft.names(), n=1)
+        hint = f" - did you mean {near[0]!r}?" if near else ""
+        allowed = ", ".join(aircraft.names())
+        found.append(Problem("aircraft", f"is {flight.aircraft[:60]!r}, must be one of {allowed}, or a folder{hint}"))
     return found
 
 

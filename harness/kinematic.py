@@ -38,7 +38,9 @@ class _KinematicFlying:
     def _state(self, x: float, y: float, psi: float, heading_rate: float) -> State:
         v_a = self._airspeed
         W_x, W_y = self._wind
-        return State(
-            x, y, self._altitude, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, 0.0, v_a, psi, heading_rate,
-            *_NO_AIRFRAME, W_x, W_y, 0.0,
+        return State._make(
+            (
+                x, y, self._altitude, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, 0.0, v_a, psi, heading_rate,
+                *_NO_AIRFRAME, W_x, W_y, 0.0,
+            )
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """The one loop: target, observation, guidance law, plant."""
 
 import math
-from array import array
+from struct import Struct
 
 import numpy as np
 
@@ -17,35 +17,39 @@ def simulate(flight: Flight) -> FlightLog:
     """Flies the flight. ValueError (`PlantError` from the plant) when it cannot start; once started it always ends in a log."""
     for problem in problems(flight):
         raise ValueError(f"{problem.name}: {problem.message}")
-    target = flight.target.start()
-    law = flight.law.start()
+    target, law = flight.target.start(), flight.law.start()
     flying = plant_of(flight).start(flight.start, flight.wind)
     period, last = flight.guidance_period, flight.periods
-    rows = array("d")
+    wind, nominal_airspeed = flight.wind.steady, flight.start.airspeed
+    in_sight = (flight.metrics.monitoring_range or math.inf) - flight.law.standoff
+    row = Struct(f"{len(COLUMNS)}d")
+    table, rows = bytearray((last + 1) * row.size), 0
     outcome, reason = Outcome.COMPLETED, ""
     try:
         for k in range(last + 1):
-            state = flying.state
-            seen = target(k * period)
-            guidance = _command(law, _observe(flight, state, seen))
-            rows.extend((k * period, *state, *seen, *guidance))
-            _keep_in_sight(flight, guidance.range_error)
+            state, seen = flying.state, target(k * period)
+            guidance = command(law, observe(state, nominal_airspeed, wind, seen))
+            row.pack_into(table, rows * row.size, k * period, *state, *seen, *guidance)
+            rows += 1
+            if guidance.range_error > in_sight:
+                raise End(Outcome.TARGET_LOST, f"beyond the monitoring range, {flight.metrics.monitoring_range:g} m")
             if k < last:
                 flying.advance(guidance.heading_rate, period)
     except End as end:
         outcome, reason = end.outcome, str(end)
-    return FlightLog(flight, outcome, reason, np.frombuffer(rows).reshape(-1, len(COLUMNS)))
+    return FlightLog(flight, outcome, reason, np.frombuffer(table)[: rows * len(COLUMNS)].reshape(rows, -1))
 
 
-def _observe(flight: Flight, state: State, seen: TargetState) -> Observation:
-    start = flight.start
-    return Observation(
-        state.north, state.east, state.velocity_north, state.velocity_east, state.airspeed, start.airspeed,
-        state.heading, state.heading_rate, state.bank, state.roll_rate, *flight.wind.steady, *seen,
-    )  # fmt: skip
+def observe(state: State, nominal_airspeed: float, wind: tuple[float, float], seen: TargetState) -> Observation:
+    """What the law gets to know: the aircraft's own state, the steady wind, the target as `seen`."""
+    x, y, _, v_x, v_y, _, airspeed, heading, heading_rate, bank, _, _, roll_rate = state[:13]
+    return Observation._make(
+        (x, y, v_x, v_y, airspeed, nominal_airspeed, heading, heading_rate, bank, roll_rate, *wind, *seen)
+    )
 
 
-def _command(law: Step, observation: Observation) -> Guidance:
+def command(law: Step, observation: Observation) -> Guidance:
+    """The law's answer. Raises `End` when it fails or is not finite: a law's fault is a flight's outcome."""
     try:
         guidance = law(observation)
     except Exception as error:
@@ -53,9 +57,3 @@ def _command(law: Step, observation: Observation) -> Guidance:
     if not math.isfinite(guidance.heading_rate):
         raise End(Outcome.INVALID, f"the law commanded {guidance.heading_rate}")
     return guidance
-
-
-def _keep_in_sight(flight: Flight, range_error: float) -> None:
-    limit = flight.metrics.monitoring_range
-    if limit is not None and range_error + flight.law.standoff > limit:
-        raise End(Outcome.TARGET_LOST, f"the target is beyond the monitoring range, {limit:g} m")

@@ -1,10 +1,12 @@
 """The 6-DOF plant: a JSBSim airframe with its native inner loop. The only file with JSBSim, and with feet, in it."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import jsbsim
 import numpy as np
@@ -19,6 +21,7 @@ from harness.wind import Wind
 
 FT = 0.3048  # m
 SLUG = 4.4482216152605 / FT  # kg
+GRAVITY = 9.80665  # m/s^2
 RADIUS = 6371000.0  # m, as in planet.xml
 GROUND = 15.0  # m: below this height the flight has ended
 DEPARTURE_BANK = math.radians(80.0)
@@ -26,6 +29,7 @@ STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
 _HARNESS = Path(__file__).parent
 _INNER_LOOP = Path(autopilot.__file__).parent
+_PROPERTY = re.compile(r"(?<![\w/])[a-z][\w-]*(?:/[\w-]+)+")
 _AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
 
 
@@ -54,6 +58,17 @@ class ModelError(RuntimeError):
     """JSBSim could not load the model as it is written."""
 
 
+def _properties(airframe: Path) -> list[str]:
+    """Every property that the model and its inner loop read."""
+    files = (aircraft.model(airframe), _INNER_LOOP / "inner_loop.xml")
+    texts = (text for file in files for text in ElementTree.parse(file).getroot().itertext())
+    return sorted({name for text in texts for name in _PROPERTY.findall(text)})
+
+
+class NoTrim(ValueError):
+    """There is no steady level flight at this airspeed."""
+
+
 def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
     """A fresh JSBSim with this airframe, stepping every `step` seconds. Raises `ModelError` with what JSBSim said."""
     _load_log.problems.clear()
@@ -67,6 +82,11 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
         raise ModelError(f"{aircraft.model(airframe)}: {error}") from error
     if not loaded or _load_log.problems:
         raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
+    missing = [name for name in _properties(airframe) if not fdm.get_property_manager().hasNode(name)]
+    if missing:
+        for name in missing:  # JSBSim ends the whole process when it reads, or merely drops, an unknown property
+            fdm[name] = 0.0
+        raise ModelError(f"{aircraft.model(airframe)}: unknown properties {', '.join(missing)}")
     for integrator in ("rate", "position"):
         write(fdm, f"simulation/integrator/{integrator}/rotational", _AB2)
     return fdm
@@ -91,7 +111,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
     """Puts the aircraft at `start`, level and unaccelerated, and gives the trim that does it.
 
     Newton's method on the accelerations that JSBSim reports, with the surfaces placed directly: their actuators do not
-    run before engagement, so no lag falsifies the result. Raises `PlantError` where there is no such trim.
+    run before engagement, so no lag falsifies the result. Raises `NoTrim` where there is none below 30 deg of pitch.
     """
     _place(fdm, start, wind)
     x = np.array([0.05, 0.0, 0.5])
@@ -105,7 +125,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
     residual = _accelerations(fdm, x)
     found = Trim(*x.tolist())
     if not (np.abs(residual).max() < 1e-8 and 0.0 < found.throttle < 1.0 and abs(found.pitch) < math.pi / 6):
-        raise PlantError("start.airspeed", f"no level trim at {start.airspeed:g} m/s")
+        raise NoTrim(f"no level trim at {start.airspeed:g} m/s")
     return found
 
 
@@ -169,28 +189,21 @@ _READ = (
     "velocities/v-east-fps",
     "velocities/v-down-fps",
     "velocities/vt-fps",
-    "velocities/u-fps",
-    "velocities/v-fps",
-    "velocities/w-fps",
-    "velocities/p-rad_sec",
-    "velocities/q-rad_sec",
-    "velocities/r-rad_sec",
-    "accelerations/udot-ft_sec2",
-    "accelerations/vdot-ft_sec2",
-    "accelerations/wdot-ft_sec2",
     "attitude/phi-rad",
     "attitude/theta-rad",
     "attitude/psi-rad",
+    "velocities/p-rad_sec",
+    "velocities/q-rad_sec",
+    "velocities/r-rad_sec",
     "inner-loop/bank-command-rad",
     "aero/alpha-rad",
     "aero/beta-rad",
+    "accelerations/Ny",
+    "accelerations/Nz",
     "fcs/left-aileron-pos-rad",
     "fcs/elevator-pos-rad",
     "fcs/rudder-pos-rad",
     "actuators/throttle-norm",
-    "atmosphere/total-wind-north-fps",
-    "atmosphere/total-wind-east-fps",
-    "atmosphere/total-wind-down-fps",
 )
 
 
@@ -205,11 +218,16 @@ class SixDof:
     def start(self, start: Start, wind: Wind) -> Flying:
         if not start.altitude > GROUND:
             raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
+        data = aircraft.data(self.airframe)
+        stall, envelope = data["aero"]["alpha_stall"]["v"], data["envelope"]
         fdm = load(self.airframe, self.step)
-        trimmed = trim(fdm, start, wind)
-        stall = aircraft.data(self.airframe)["aero"]["alpha_stall"]["v"]
-        if trimmed.pitch >= stall:
-            raise PlantError("start.airspeed", f"{start.airspeed:g} m/s: level flight would be beyond the stall")
+        try:
+            trimmed = trim(fdm, start, wind)
+        except NoTrim as error:
+            raise PlantError(
+                "start.airspeed",
+                f"{error}; {self.airframe.name} flies from {envelope['V_min']['v']:g} to {envelope['V_max']['v']:g} m/s",
+            ) from None
         engage(fdm, trimmed, start, self.rate_trim)
         return _SixDofFlying(fdm, self.step, start, wind, stall)
 
@@ -219,25 +237,23 @@ class _SixDofFlying:
         manager = fdm.get_property_manager()
         self._run: Callable[[], bool] = fdm.run
         self._readers = [manager.get_node(name).get_double_value for name in _READ]
+        self._velocity_north, self._velocity_east = self._readers[3:5]
         self._command = manager.get_node("inner-loop/command/heading-rate-rad_s").set_double_value
         self._step = step
         self._north, self._east = start.position
         self._wind = wind.steady
-        self._gravity = FT * fdm["accelerations/gravity-ft_sec2"]
         self._stall, self._stalled_for = stall, 0.0
-        self.state = self._read()
+        self.state = self._read(self._heading())
 
     def advance(self, heading_rate: float, period: float) -> None:
         self._command(heading_rate)
         run = self._run
-        for _ in range(round(period / self._step)):
+        for _ in range(round(period / self._step) - 1):
             run()
-        self.state = state = self._read()
-        if (
-            not state.altitude > GROUND
-            or not abs(state.bank) < DEPARTURE_BANK
-            or not state.angle_of_attack < self._stall
-        ):
+        before = self._heading()
+        run()
+        self.state = state = self._read(before)
+        if not (state.altitude > GROUND and abs(state.bank) < DEPARTURE_BANK and state.angle_of_attack < self._stall):
             self._judge(state, period)
         else:
             self._stalled_for = 0.0
@@ -253,29 +269,24 @@ class _SixDofFlying:
         if self._stalled_for > STALL_TIME:
             raise End(Outcome.DEPARTED, f"stalled for {STALL_TIME:g} s")
 
-    def _read(self) -> State:
-        (
-            n, e, h, v_n, v_e, v_d, V, u, v, w, p, q, r, u_dot, v_dot, w_dot,
-            phi, theta, psi, phi_c, alpha, beta, d_a, d_e, d_r, d_t, w_n, w_e, w_d,
-        ) = [get() for get in self._readers]  # fmt: skip
+    def _heading(self) -> float:
+        """The direction of the velocity in the steady air."""
         W_x, W_y = self._wind
-        V_x, V_y = v_n * FT - W_x, v_e * FT - W_y  # velocity in the steady air
-        sin_phi, cos_phi = math.sin(phi), math.cos(phi)
-        sin_theta, cos_theta = math.sin(theta), math.cos(theta)
-        sin_psi, cos_psi = math.sin(psi), math.cos(psi)
-        a_x = FT * (u_dot + q * w - r * v)  # acceleration over the ground, body axes
-        a_y = FT * (v_dot + r * u - p * w)
-        a_z = FT * (w_dot + p * v - q * u)
-        a_ahead = a_x * cos_theta + (a_y * sin_phi + a_z * cos_phi) * sin_theta  # the same in the horizontal plane
-        a_right = a_y * cos_phi - a_z * sin_phi
-        a_n, a_e = a_ahead * cos_psi - a_right * sin_psi, a_ahead * sin_psi + a_right * cos_psi
-        g = self._gravity
-        return State(
-            self._north + n * FT, self._east + e * FT, h * FT, v_n * FT, v_e * FT, v_d * FT, V * FT,
-            math.atan2(V_y, V_x), (V_x * a_e - V_y * a_n) / (V_x * V_x + V_y * V_y),
-            phi, theta, wrap(psi), p, q, r, phi_c, alpha, beta,
-            a_y - g * sin_phi * cos_theta, cos_phi * cos_theta - a_z / g,
-            d_a, d_e, d_r, d_t, w_n * FT, w_e * FT, w_d * FT,
+        return math.atan2(FT * self._velocity_east() - W_y, FT * self._velocity_north() - W_x)
+
+    def _read(self, before: float) -> State:
+        """The state now; `before` is the heading one step ago, which gives its rate (over that step)."""
+        n, e, h, v_n, v_e, v_d, V, *attitude_and_rates, phi_c, alpha, beta, N_y, N_z, d_a, d_e, d_r, d_t = [
+            get() for get in self._readers
+        ]
+        W_x, W_y = self._wind
+        heading = math.atan2(FT * v_e - W_y, FT * v_n - W_x)
+        return State._make(
+            (
+                self._north + FT * n, self._east + FT * e, FT * h, FT * v_n, FT * v_e, FT * v_d, FT * V,
+                heading, wrap(heading - before) / self._step, *attitude_and_rates, phi_c, alpha, beta,
+                GRAVITY * N_y, N_z, d_a, d_e, d_r, d_t, W_x, W_y, 0.0,
+            )
         )  # fmt: skip
 
 

@@ -6,9 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from autopilot.quantities import About, Degrees, DegreesPerSecond, Metres, MetresPerSecond, MetresPerSecond2, Seconds
+
+
+_FASTEST_TURN = math.radians(1000.0)  # far beyond any target; keeps the closed form's angles meaningful
 
 
 class TargetState(NamedTuple):
@@ -26,10 +29,10 @@ class TargetState(NamedTuple):
 class Segment:
     """A time in which the target accelerates, turns, or both. Where segments overlap, they add up."""
 
-    from_: Annotated[Seconds, Ge(0), About("when it begins")]
-    to: Annotated[Seconds, Ge(0), About("when it ends")]
-    acceleration: Annotated[MetresPerSecond2, About("rate of the speed")] = 0.0
-    turn_rate: Annotated[DegreesPerSecond, About("clockwise")] = 0.0
+    from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
+    to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
+    acceleration: Annotated[MetresPerSecond2, Ge(-100), Le(100), About("rate of the speed")] = 0.0
+    turn_rate: Annotated[DegreesPerSecond, Ge(-_FASTEST_TURN), Le(_FASTEST_TURN), About("clockwise")] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

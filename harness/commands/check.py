@@ -18,7 +18,7 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
     from harness.commands.telling import feasibility_line, read_flight_file
     from harness.flight import warnings
 
-    flight = read_flight_file(file, overrides).flight
+    _, flight = read_flight_file(file, overrides)
     click.echo(feasibility_line(flight))
     for warning in warnings(flight):
         click.echo(f"warning: {warning}")

@@ -31,6 +31,7 @@ def demo(out: Path) -> None:
     from rich.table import Table
 
     from harness import demo as job
+    from harness.commands.telling import number
 
     console, progress_to = Console(), Console(stderr=True)
     flown, written = [], []
@@ -52,7 +53,7 @@ def demo(out: Path) -> None:
         for one in those:
             table.add_column(f"{one.law}\n{one.plant}", justify="right")
         for label, metric in SHOWN.items():
-            table.add_row(label, *(job.number(one.metrics[metric]) for one in those))
+            table.add_row(label, *(number(one.metrics[metric]) for one in those))
         console.print(table)
         for sentence in job.differences(those):
             console.print(f"- {sentence}", highlight=False, soft_wrap=False)

@@ -1,0 +1,36 @@
+# Everything rests on `install`, which makes .venv from the hashed lock file; needs python3 (3.11 or later), venv, make, pip.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test install models lock bench clean
+
+demo: install  ## fly the main job: the paper's case, two laws, three aircraft
+	$(BIN)/harness demo --out out/demo
+
+test: install  ## everything CI checks
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest
+
+install: .venv/installed  ## .venv with .venv/bin/harness
+
+.venv/installed: requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+models: install  ## write the JSBSim models from the airframes' data
+	$(BIN)/python -m aircraft.write_models
+
+bench: install  ## the speed of the loop, as ratios in one run
+	$(BIN)/python -m benchmarks.flight_speed
+
+lock:  ## resolve the dependencies anew (needs uv)
+	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \
+		--custom-compile-command "make lock" --output-file requirements.lock --quiet --upgrade
+
+clean:
+	rm -rf .venv out

@@ -1,0 +1,28 @@
+"""What there is, in lines for `harness list`."""
+
+from collections.abc import Iterator
+from typing import get_args, get_type_hints
+
+import aircraft
+from autopilot.laws import LAWS
+from harness.flight import Flight
+from harness.metrics import MEANING
+
+
+def lines(kind: str) -> Iterator[str]:
+    """The lines of one kind: laws, aircraft, plants or metrics."""
+    match kind:
+        case "laws":
+            for name, law in LAWS.items():
+                yield f"{name}: {(law.value.__doc__ or '').splitlines()[0]}"
+                for gains, values in law.gain_sets.items():
+                    yield f"    {gains}: " + ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
+        case "aircraft":
+            for name in aircraft.names():
+                data = aircraft.data(aircraft.folder(name))
+                yield f"{name}: {data['meta']['long_name']}, {data['meta']['layout']}; {data['envelope']['V_design']['v']:g} m/s"
+        case "plants":
+            yield from get_args(get_type_hints(Flight)["plant"])
+        case "metrics":
+            for name, meaning in MEANING.items():
+                yield f"{name:30} {meaning}"

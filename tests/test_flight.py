@@ -1,0 +1,79 @@
+"""What is said of a flight before it is flown."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from autopilot.laws import law
+from harness.flight import Flight, feasibility_margin, needed_heading_rate, problems, warnings
+from harness.kinematic import Kinematic
+from harness.plant import Start
+from harness.target import Segment, Target
+from harness.wind import Wind
+
+FLIGHT = Flight(plant="kinematic", law=law("smc", max_heading_rate=math.radians(5.0)))
+
+
+@pytest.mark.parametrize(
+    ("wind", "target_speed", "needed_deg_s"), [(0, 0, 3.72), (2, 0, 4.96), (5, 0, 7.14), (0, 7, 8.81), (0, 11, 12.70)]
+)
+def test_holding_the_circle_takes_the_rate_of_the_formula(wind: float, target_speed: float, needed_deg_s: float) -> None:
+    flight = replace(FLIGHT, wind=Wind(steady=(wind, 0.0)), target=Target(speed=target_speed))
+    assert math.degrees(needed_heading_rate(flight)) == pytest.approx(needed_deg_s, abs=0.01)
+    assert math.degrees(feasibility_margin(flight)) == pytest.approx(5.0 - needed_deg_s, abs=0.01)
+
+
+def test_the_needed_rate_is_the_largest_on_a_circle_really_flown_round_a_moving_target() -> None:
+    """Fly the target-fixed circle point by point in the kinematics and differentiate the heading."""
+    wind, speed, v_a, R_d = (0.0, -3.0), 4.0, 13.0, 200.0
+    w = (wind[0] - speed, wind[1])
+    angles = [k * math.tau / 200000 for k in range(200001)]
+    headings, rates = [], []
+    for theta in angles:  # relative to the target: air velocity + w must lie along the tangent
+        tangent = (math.sin(theta), -math.cos(theta))
+        across = w[0] * math.cos(theta) + w[1] * math.sin(theta)
+        headings.append(math.atan2(tangent[1], tangent[0]) - math.asin(across / v_a))
+        along = w[0] * tangent[0] + w[1] * tangent[1]
+        rates.append((math.sqrt(v_a**2 - across**2) + along) / R_d)  # of the azimuth
+    d = [math.remainder(b - a, math.tau) / (angles[1] - angles[0]) for a, b in zip(headings, headings[1:], strict=False)]
+    flown = max(abs(slope * rate) for slope, rate in zip(d, rates, strict=False))
+    flight = replace(FLIGHT, wind=Wind(steady=wind), target=Target(speed=speed))
+    assert needed_heading_rate(flight) == pytest.approx(flown, rel=1e-3)
+
+
+def test_a_target_that_speeds_up_counts_at_its_fastest() -> None:
+    fast = Target(speed=0.0, segments=(Segment(from_=10.0, to=20.0, acceleration=0.5),))
+    assert feasibility_margin(replace(FLIGHT, target=fast)) == feasibility_margin(
+        replace(FLIGHT, target=Target(speed=5.0))
+    )
+
+
+def test_impossible_settings_are_named() -> None:
+    wrong = replace(
+        FLIGHT,
+        guidance_period=0.052,
+        wind=Wind(steady=(12.0, 5.0)),
+        aircraft="ultrastick",
+        target=Target(speed=1.0, segments=(Segment(from_=3.0, to=2.0), Segment(from_=5.0, to=9.0, acceleration=-1.0))),
+    )
+    assert [p.name for p in problems(wrong)] == [
+        "guidance_period", "wind.steady", "target.segments.0.to", "target.segments", "aircraft",
+    ]  # fmt: skip
+    assert "did you mean 'ultra_stick_25e'" in problems(wrong)[-1].message
+
+
+def test_remark_1_and_an_infeasible_circle_are_warnings() -> None:
+    said = " ".join(warnings(replace(FLIGHT, wind=Wind(steady=(8.0, 0.0)), target=Target(speed=6.0, heading=2.0))))
+    assert "Remark 1" in said
+    assert "infeasible" in said
+    assert warnings(FLIGHT) == []
+
+
+def test_more_heading_rate_than_the_bank_limit_gives_is_a_warning() -> None:
+    steep = replace(FLIGHT, plant="sixdof", law=law("smc", max_heading_rate=math.radians(60.0)))
+    assert ["inner loop" in text for text in warnings(steep)] == [True]
+
+
+def test_a_kinematic_start_needs_no_height() -> None:
+    assert Kinematic().start(Start(altitude=0.0), Wind()).state.altitude == 0.0

@@ -1,0 +1,100 @@
+"""The metrics against logs whose numbers are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from autopilot.laws import law
+from harness.flight import Flight
+from harness.flight_log import COLUMNS, FlightLog
+from harness.metrics import MEANING, metrics
+from harness.plant import Outcome
+
+TIME = np.arange(0.0, 100.0, 0.05)
+
+
+def log_of(**columns: object) -> FlightLog:
+    """A log of 100 s at 20 Hz with these columns, zero or NaN elsewhere."""
+    table = np.zeros((len(TIME), len(COLUMNS)))
+    table[:, COLUMNS.index("time")] = TIME
+    table[:, COLUMNS.index("airspeed")] = 13.0
+    table[:, COLUMNS.index("altitude")] = 150.0
+    for name in ("bank", "sideslip", "lateral_acceleration"):
+        table[:, COLUMNS.index(name)] = math.nan
+    for name, values in columns.items():
+        table[:, COLUMNS.index(name)] = values
+    return FlightLog(Flight(plant="kinematic", law=law("smc")), Outcome.COMPLETED, "", table)
+
+
+def test_convergence_is_for_good() -> None:
+    error = 50.0 * np.exp(-TIME / 10.0)
+    assert metrics(log_of(range_error=error))["convergence_time_s"] == pytest.approx(10.0 * math.log(50.0), abs=0.06)
+    error[(TIME > 70.0) & (TIME < 70.2)] = 3.0  # leaves once more
+    assert metrics(log_of(range_error=error))["convergence_time_s"] == pytest.approx(70.2, abs=0.06)
+    error[TIME > 96.0] = 0.5  # inside, but not for 5 s after having been out
+    error[(TIME > 95.5) & (TIME < 95.8)] = 3.0
+    assert metrics(log_of(range_error=error))["convergence_time_s"] is None
+
+
+def test_a_flight_inside_the_tolerance_from_the_start_has_converged_at_zero() -> None:
+    assert metrics(log_of(range_error=0.1))["convergence_time_s"] == 0.0
+
+
+def test_range_error_is_judged_over_the_last_half() -> None:
+    error = np.where(TIME < 50.0, 80.0, 2.0 * np.sin(TIME))
+    judged = metrics(log_of(range_error=error))
+    assert judged["range_error_rms_m"] == pytest.approx(math.sqrt(2.0), rel=0.02)
+    assert judged["range_error_peak_m"] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_overshoot_is_the_largest_error_beyond_the_circle() -> None:
+    error = 60.0 * np.exp(-TIME / 20.0) * np.cos(TIME / 5.0)
+    beyond = error[error < 0]
+    assert metrics(log_of(range_error=error))["overshoot_m"] == pytest.approx(-beyond.min())
+    assert metrics(log_of(range_error=np.exp(-TIME)))["overshoot_m"] is None
+
+
+def test_saturation_counts_commands_at_the_limit() -> None:
+    unlimited = np.where(TIME >= 75.0, 1.0, 0.01)
+    command = np.minimum(unlimited, 0.08)
+    judged = metrics(log_of(heading_rate_command=command, unlimited_command=unlimited))
+    assert judged["saturation_fraction"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_activity_is_total_variation_per_second() -> None:
+    square = np.where(np.floor(TIME) % 2 == 0, 0.05, -0.05)
+    judged = metrics(log_of(heading_rate_command=square, unlimited_command=square))
+    assert judged["command_activity_deg_s2"] == pytest.approx(math.degrees(0.1), rel=0.03)
+
+
+@pytest.mark.parametrize(("lag", "gain"), [(0.0, 1.0), (0.3, 0.9), (0.425, 1.05)])
+def test_lag_and_gain_of_a_delayed_turn_are_found(lag: float, gain: float) -> None:
+    amplitude, w = 0.06, 0.4
+    command = amplitude * np.cos(w * (TIME + 0.025))  # the held command, at the middle of its period
+    heading = 0.3 + gain * amplitude / w * np.sin(w * (TIME - lag))
+    judged = metrics(log_of(heading_rate_command=command, unlimited_command=command, heading=heading))
+    assert judged["heading_rate_lag_s"] == pytest.approx(lag, abs=0.02)
+    assert judged["heading_rate_gain"] == pytest.approx(gain, rel=0.01)
+
+
+def test_a_constant_command_tells_nothing_of_lag() -> None:
+    judged = metrics(log_of(heading_rate_command=0.05, unlimited_command=0.05, heading=0.05 * TIME))
+    assert judged["heading_rate_lag_s"] is None
+    assert judged["heading_rate_error_rms_deg_s"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_turn_ratio_is_heading_rate_over_the_coordinated_one() -> None:
+    bank = 0.2 * np.sin(0.3 * TIME)
+    rate = 0.93 * 9.80665 * np.tan(bank) / 13.0
+    assert metrics(log_of(bank=bank, heading_rate=rate))["turn_ratio"] == pytest.approx(0.93)
+
+
+def test_what_a_plant_does_not_have_is_none() -> None:
+    judged = metrics(log_of())
+    assert set(judged) == set(MEANING)
+    missing = {name for name, value in judged.items() if value is None}
+    assert missing == {
+        "overshoot_m", "heading_rate_lag_s", "heading_rate_gain", "turn_ratio", "sideslip_rms_deg", "sideslip_peak_deg",
+        "bank_peak_deg", "lateral_acceleration_rms_mps2",
+    }  # fmt: skip

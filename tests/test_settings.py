@@ -1,0 +1,247 @@
+"""The border between a settings file and a flight."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from autopilot.laws import LAWS, law
+from harness.flight import Flight
+from harness.plant import Start
+from harness.settings import (
+    SettingsError,
+    document,
+    file_key,
+    flight_from_document,
+    load_flight,
+    put,
+    read_settings,
+)
+from harness.target import Segment
+
+STATIONARY = Path(__file__).parent.parent / "experiments" / "stationary.toml"
+SHORTEST = '[flight]\nplant = "kinematic"\n[flight.law]\nname = "nftsm"\n'
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    """Writes `a.toml` in the working folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def written(text: str | bytes) -> Path:
+        Path("a.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
+        return Path("a.toml")
+
+    return written
+
+
+def mistakes(path: Path, *overrides: str) -> list[str]:
+    with pytest.raises(SettingsError) as caught:
+        load_flight(path, overrides)
+    assert str(caught.value) == "\n".join(caught.value.lines)
+    return caught.value.lines
+
+
+def test_the_stationary_experiment_is_table_1_with_the_gains_of_nftsm_1() -> None:
+    assert load_flight(STATIONARY) == Flight(plant="sixdof", law=law("nftsm", "paper_1"))
+    assert read_settings(STATIONARY).experiment().title == "Stationary target"
+
+
+def test_the_stationary_experiment_shows_every_key_that_a_file_may_set() -> None:
+    text = STATIONARY.read_text()
+    settings = document(load_flight(STATIONARY))
+    gains = LAWS["nftsm"].gain_sets["paper"]
+    tables = [settings, *(table for table in settings.values() if isinstance(table, dict))]
+    assert [key for table in tables for key in table if key not in gains and key not in text] == []
+
+
+def test_what_a_file_leaves_out_has_the_dataclass_default(write) -> None:
+    assert load_flight(write(SHORTEST)) == Flight(plant="kinematic", law=law("nftsm"))
+
+
+def test_degrees_become_radians_and_only_there(write) -> None:
+    text = SHORTEST + "max_heading_rate_deg_s = 10\n[flight.start]\nheading_deg = -90\nposition_m = [1, 2.5]\n"
+    flight = load_flight(
+        write(text + "[flight.target]\nsegments = [{ from_s = 1, to_s = 2, turn_rate_deg_s = 180 }]\n")
+    )
+    assert flight.law.max_heading_rate == math.radians(10.0)
+    assert flight.start == Start(heading=-math.pi / 2, position=(1.0, 2.5))
+    assert flight.target.segments == (Segment(from_=1.0, to=2.0, turn_rate=math.pi),)
+
+
+def test_single_gains_override_the_named_set(write) -> None:
+    flight = load_flight(write(SHORTEST + 'gains = "paper_1"\nbeta2 = 1\n'))
+    assert flight.law == law("nftsm", "paper_1", beta2=1.0)
+
+
+@pytest.mark.parametrize(
+    "override", ["start.heading_deg=130", "flight.start.heading_deg=130.0", " start.heading_deg = 130 "]
+)
+def test_an_override_replaces_what_the_file_says(override: str) -> None:
+    assert load_flight(STATIONARY, [override]).start.heading == math.radians(130.0)
+
+
+def test_an_override_that_is_no_toml_is_a_string() -> None:
+    assert load_flight(STATIONARY, ["plant=kinematic", "law.gains=paper"]).law == law("nftsm", "paper")
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False), st.floats(min_value=1e-6, max_value=1e6))
+def test_a_flight_is_written_and_read_back_to_the_last_bit(heading: float, limit: float) -> None:
+    flight = flight_from_document(
+        {
+            "plant": "kinematic",
+            "start": {"heading_deg": heading},
+            "law": {"name": "smc", "max_heading_rate_deg_s": limit, "c1": 0.3},
+            "target": {"segments": [{"from_s": 0, "to_s": limit, "turn_rate_deg_s": -limit}]},
+        }
+    )
+    assert flight_from_document(json.loads(json.dumps(document(flight), allow_nan=False))) == flight
+
+
+@given(st.integers(-36000, 36000))
+def test_a_heading_is_written_as_it_was_typed(hundredths: int) -> None:
+    heading = hundredths / 100
+    start = {"heading_deg": heading}
+    flight = flight_from_document({"plant": "kinematic", "law": {"name": "smc"}, "start": start})
+    assert document(flight)["start"]["heading_deg"] == heading
+
+
+def test_a_flight_made_in_python_needs_no_named_set() -> None:
+    value = type(law("smc"))(c1=0.1, c2=0.2, c3=0.3, epsilon=0.4)
+    flight = Flight(plant="kinematic", law=value)
+    assert document(flight)["law"]["gains"] == "custom"
+    assert flight_from_document(document(flight)) == flight
+
+
+@pytest.mark.parametrize("infinite", ["inf", '"inf"'])
+def test_the_heading_rate_limit_may_be_infinite(write, infinite: str) -> None:
+    flight = load_flight(write(f"{SHORTEST}max_heading_rate_deg_s = {infinite}\n"))
+    assert flight.law.max_heading_rate == math.inf
+    assert document(flight)["law"]["max_heading_rate_deg_s"] == "inf"
+    assert flight_from_document(document(flight)) == flight
+
+
+def test_an_unknown_key_names_its_line_and_the_nearest_key(write) -> None:
+    (line,) = mistakes(write(f"{SHORTEST}standoff = 200.0\n"))
+    assert line.startswith("a.toml:5: flight.law.standoff: unknown key, known here: airspeed, alpha2, ")
+    assert line.endswith(" - did you mean 'standoff_m'?")
+
+
+@pytest.mark.parametrize(
+    ("law_line", "wrong"),
+    [
+        ('alpha2 = "0.5"', 'alpha2: is "0.5", must be a number >= 0'),
+        ("alpha2 = true", "alpha2: is true, must be a number >= 0"),
+        ("beta3 = 1.5", "beta3: is 1.5, must be a number > 0 and < 1"),
+        ("max_heading_rate_deg_s = nan", "max_heading_rate_deg_s: is nan, must be a number > 0 or inf"),
+        ("standoff_m = inf", "standoff_m: is inf, must be a finite number > 0"),
+        ('direction = "papr"', 'direction: is "papr", must be "paper" or "mirrored" - did you mean \'paper\'?'),
+        ("gains = 3", 'gains: is 3, must be one of "paper", "paper_1"'),
+        ('"a.b" = 3', '"a.b": unknown key'),
+    ],
+)
+def test_a_wrong_value_is_told_with_what_is_allowed(write, law_line: str, wrong: str) -> None:
+    (line,) = mistakes(write(f"{SHORTEST}\n{law_line}\n"))
+    assert line.startswith(f"a.toml:6: flight.law.{wrong}")
+
+
+def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(write) -> None:
+    text = """titel = "x"
+[flight]
+duration_s = "long"
+seed = 1.0
+[flight.law]
+name = "smcc"
+[flight.start]
+position_m = [1, "a"]
+[flight.target]
+segments = [
+  { from_s = 0, to_s = 1 },
+  { from_s = 0, turn_rate = 1 },
+]
+[flight.inner_loop]
+rate_trim = 1
+"""
+    starts = [line.partition(",")[0] for line in mistakes(write(text))]
+    assert starts == [
+        "a.toml:1: titel: unknown key",
+        "a.toml:2: flight.plant: is missing",
+        'a.toml:3: flight.duration_s: is "long"',
+        "a.toml:4: flight.seed: is 1.0",
+        'a.toml:6: flight.law.name: is "smcc"',
+        "a.toml:8: flight.start.position_m: is [1",
+        "a.toml:12: flight.target.segments.1.to_s: is missing",
+        "a.toml:12: flight.target.segments.1.turn_rate: unknown key",
+        "a.toml:15: flight.inner_loop.rate_trim: is 1",
+    ]
+
+
+def test_what_is_impossible_together_is_told_at_the_key_of_the_file(write) -> None:
+    text = (
+        f"{SHORTEST}[flight.wind]\nsteady_mps = [13, 1]\n[flight.target]\nsegments = [\n{{ from_s = 5, to_s = 3 }}]\n"
+    )
+    wind, segment = mistakes(write(text))
+    assert wind.startswith("a.toml:6: flight.wind.steady_mps: wind of 13.0384 m/s")
+    assert segment.startswith("a.toml:9: flight.target.segments.0.to_s: 3 s")
+
+
+def test_a_mistake_in_an_override_is_told_as_it_was_typed(write) -> None:
+    path = write(f"{SHORTEST}alpha2 = -1\n")
+    assert mistakes(path, "start.heading_deg=north", "law.alpha2=-2") == [
+        "--set law.alpha2=-2: flight.law.alpha2: is -2, must be a number >= 0",
+        '--set start.heading_deg=north: flight.start.heading_deg: is "north", must be a number',
+    ]
+    assert mistakes(path, "plant", "law.name.x=1") == [
+        "--set plant: must be KEY=VALUE, as in law.gains=paper_1",
+        "--set law.name.x=1: flight.law.name is no table",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[flight]\nplant = kinematic\n", "a.toml:2: no valid TOML: Invalid value"),
+        ("\n[flight", "a.toml:2: no valid TOML: Expected ']' at the end of a table declaration"),
+        (b"# \xc3\xa4\n# \xff\n", "a.toml:2: no text in UTF-8"),
+        ("", "a.toml:1: flight: is missing, must be a table"),
+        (f"{SHORTEST}[matrix]\nseed = [1]\n", "a.toml:5: matrix: many flights, not one: use `harness run`"),
+    ],
+)
+def test_a_file_that_is_no_flight_is_told_in_one_line(write, text: str | bytes, told: str) -> None:
+    assert mistakes(write(text)) == [told]
+
+
+def test_a_file_that_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
+    assert mistakes(tmp_path / "none.toml") == [f"{tmp_path}/none.toml: No such file or directory"]
+    assert mistakes(tmp_path) == [f"{tmp_path}: Is a directory"]
+
+
+def test_a_field_is_located_by_its_dotted_name(write) -> None:
+    file = read_settings(write(f"{SHORTEST}[flight.start]\nairspeed_mps = 3\n"), ["start.altitude_m=1"])
+    assert file.locate("start.airspeed") == "a.toml:6: flight.start.airspeed_mps"
+    assert file.locate("start.heading") == "a.toml:5: flight.start.heading_deg"
+    assert file.locate("start.altitude") == "--set start.altitude_m=1: flight.start.altitude_m"
+    assert file_key("target.segments.2.from_") == ("flight", "target", "segments", 2, "from_s")
+    assert file_key("law.max_heading_rate") == ("flight", "law", "max_heading_rate_deg_s")
+
+
+def test_a_dotted_key_is_put_into_tables_that_were_not_there() -> None:
+    settings: dict[str, object] = {}
+    assert put(settings, "law.gains", "paper") == ("flight", "law", "gains")
+    assert settings == {"flight": {"law": {"gains": "paper"}}}
+
+
+def test_a_document_without_a_file_is_told_by_its_keys() -> None:
+    with pytest.raises(SettingsError) as caught:
+        flight_from_document({"plant": "sixdof", "law": {"name": "smc"}, "seed": -1})
+    assert caught.value.lines == ["flight.seed: is -1, must be a whole number >= 0"]
+
+
+def test_reading_settings_loads_no_simulator() -> None:
+    code = "import harness.settings, sys; assert not {'jsbsim', 'pandas', 'rerun', 'scipy'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=STATIONARY.parent.parent)
