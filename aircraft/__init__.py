@@ -13,7 +13,7 @@ def names() -> list[str]:
 
 
 def folder(name: str) -> Path:
-    """The folder of an airframe: one of `names()`, or a path to a folder laid out alike. FileNotFoundError otherwise."""
+    """The folder of an airframe: one of `names()`, or a path to a folder laid out alike. Else FileNotFoundError."""
     for candidate in (FOLDER / name, Path(name)):
         if (candidate / "airframe.toml").is_file() and model(candidate).is_file():
             return candidate.resolve()

@@ -5,13 +5,13 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from autopilot import nftsm, smc
-from autopilot.standoff import StandoffLaw
+from autopilot.guidance import Law
 
 
 class LawKind(NamedTuple):
     """A law's class and its gain sets; the set `paper` is every law's default."""
 
-    value: type[StandoffLaw]
+    value: type[Law]
     gain_sets: Mapping[str, Mapping[str, float]]
 
 
@@ -23,7 +23,7 @@ LAWS: Mapping[str, LawKind] = MappingProxyType(
 )
 
 
-def law(name: str, gains: str = "paper", **parameters: float | str) -> StandoffLaw:
+def law(name: str, gains: str = "paper", **parameters: float | str) -> Law:
     """A law by name with a named gain set; `parameters` (SI, rad) override it. KeyError for unknown names."""
     kind = LAWS[name]
-    return kind.value(**{"gains": gains, **kind.gain_sets[gains], **parameters})  # type: ignore[arg-type]
+    return kind.value(**{"gains": gains, **kind.gain_sets[gains], **parameters})

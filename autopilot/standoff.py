@@ -18,13 +18,15 @@ from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 _CLOSEST = 1e-6  # m: nearer than this the azimuth has no meaning, and its rate is bounded by it
 
 
-Motion = tuple[float, float, float, float, float]  # r, its rate, rate of lam, heading error, rate of the desired bar psi_a
+Motion = tuple[
+    float, float, float, float, float
+]  # r, its rate, rate of lam, heading error, rate of the desired bar psi_a
 
 
 def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Motion:
     """Eq. (5), (7), (20), as corrected in `docs/errata.md`, for airspeed `v_a` and heading `psi_a`. SI, rad.
 
-    With lam = theta - pi/2, v sin(psi - lam) is a velocity away from the target and v cos(psi - lam) the one along lam.
+    With lam = theta - pi/2, v sin(psi - lam) is a velocity away from the target, v cos(psi - lam) the one along lam.
     """
     x, y, _, _, _, _, _, _, _, _, W_x, W_y, x_t, y_t, v_t_x, v_t_y, a_t, omega_t = o
     x_r, y_r = x - x_t, y - y_t
@@ -51,7 +53,7 @@ def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Mot
 
 
 def course_rate_ratio(v_a: float, psi_a: float, W_x: float, W_y: float) -> float:
-    """L(psi_a) of Eq. (3): the course rate over the heading rate, for |wind| < v_a. Above 1/2; above 1 in a headwind."""
+    """L(psi_a) of Eq. (3): the course rate over heading rate, for |wind| < v_a. Above 1/2; above 1 in a headwind."""
     along = v_a * (W_x * cos(psi_a) + W_y * sin(psi_a))
     return (v_a * v_a + along) / (v_a * v_a + W_x * W_x + W_y * W_y + 2.0 * along)
 
@@ -77,7 +79,9 @@ class StandoffLaw:
     """What every standoff law has: the circle, the limit, and how the command is given."""
 
     standoff: Annotated[Metres, Gt(0), About("desired distance to the target, R_d")] = 200.0
-    max_heading_rate: Annotated[DegreesPerSecond, Gt(0), Unlimited(), About("limit of the command, Eq. (2)")] = radians(5.0)
+    max_heading_rate: Annotated[DegreesPerSecond, Gt(0), Unlimited(), About("limit of the command, Eq. (2)")] = radians(
+        5.0
+    )
     direction: Annotated[
         Literal["paper", "mirrored"], About("way round: the paper's goes anticlockwise on a map, mirrored clockwise")
     ] = "paper"
@@ -90,7 +94,6 @@ class StandoffLaw:
 
 def standoff_step(law: StandoffLaw, reach: Reaching) -> Step:
     """The law in flight: `reach` gives (feed-forward, rest of the command, s) for the paper's way round."""
-
     R_d, max_rate = law.standoff, law.max_heading_rate
     measured, by_course = law.airspeed == "measured", law.command == "course_rate"
 

@@ -1,7 +1,7 @@
 """The cost of a flight beside the bare simulation: `python -m benchmarks.flight_speed [PAIRS]`.
 
-A 900 s 6-DOF flight (0.005 s steps, 20 Hz guidance, every channel logged at 20 Hz) against a bare loop of as many steps
-of the same trimmed model with its inner loop engaged, in turn; a 100 s kinematic flight; building, loading and trimming.
+A 900 s 6-DOF flight (0.005 s steps, 20 Hz guidance, every channel logged at 20 Hz) against a bare loop of as many
+steps of the same trimmed model with its inner loop engaged, in turn; a 100 s kinematic flight; building and trimming.
 Processor time, so that other processes on the machine disturb less; the median and the range of the pairs are printed.
 """
 
@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import aircraft
 from autopilot.laws import law
@@ -56,14 +57,16 @@ def main(pairs: int) -> None:
         bare, flown = [], []
         for _ in range(pairs):
             bare.append(bare_loop(flight))
-            flown.append(seconds(lambda flight=flight: simulate(flight)))  # type: ignore[misc]  # bound at once
+            flown.append(seconds(partial(simulate, flight)))
         ratios = [f / b for f, b in zip(flown, bare, strict=True)]
         print(f"{name}: 900 s flight / bare loop {spread(ratios)}; flight {spread(flown)} s")
         plant = SixDof(aircraft.folder(name), flight.step, rate_trim=True)
-        built = [seconds(lambda plant=plant: plant.start(flight.start, flight.wind)) for _ in range(20)]  # type: ignore[misc]
+        built = [seconds(partial(plant.start, flight.start, flight.wind)) for _ in range(20)]
         print(f"{name}: build, load and trim {spread(built[1:], 1e3)} ms after the first ({1e3 * built[0]:.1f} ms)")
     simulate(kinematic)
-    print(f"kinematic: 100 s flight {spread([seconds(lambda: simulate(kinematic)) for _ in range(4 * pairs)], 1e3)} ms")
+    print(
+        f"kinematic: 100 s flight {spread([seconds(partial(simulate, kinematic)) for _ in range(4 * pairs)], 1e3)} ms"
+    )
 
 
 if __name__ == "__main__":

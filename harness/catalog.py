@@ -20,7 +20,8 @@ def lines(kind: str) -> Iterator[str]:
         case "aircraft":
             for name in aircraft.names():
                 data = aircraft.data(aircraft.folder(name))
-                yield f"{name}: {data['meta']['long_name']}, {data['meta']['layout']}; {data['envelope']['V_design']['v']:g} m/s"
+                speed = data["envelope"]["V_design"]["v"]
+                yield f"{name}: {data['meta']['long_name']}, {data['meta']['layout']}; {speed:g} m/s"
         case "plants":
             yield from get_args(get_type_hints(Flight)["plant"])
         case "metrics":

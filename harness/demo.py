@@ -1,4 +1,4 @@
-"""The main job: the paper's stationary target with both laws, on the kinematic and on two 6-DOF aircraft, side by side."""
+"""The main job: the paper's stationary target under both laws, on the kinematic and two 6-DOF aircraft side by side."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -84,8 +84,7 @@ def notes(flown: list[Flown]) -> str:
     """A Markdown table of the metrics, a column per flight."""
     lines = ["| | " + " | ".join(f.plant for f in flown) + " |", "|---|" + "---|" * len(flown)]
     lines.append("| outcome | " + " | ".join(f.log.outcome.value for f in flown) + " |")
-    for name in flown[0].metrics:
-        lines.append(f"| {name} | " + " | ".join(number(f.metrics[name]) for f in flown) + " |")
+    lines += [f"| {name} | " + " | ".join(number(f.metrics[name]) for f in flown) + " |" for name in flown[0].metrics]
     return "\n".join(lines)
 
 
@@ -98,7 +97,8 @@ def differences(flown: list[Flown]) -> list[str]:
         worst = max(flown, key=lambda f: f.metrics["range_error_peak_m"] or 0.0)
         least = min(flown, key=lambda f: f.metrics["range_error_peak_m"] or 0.0)
         said.append(
-            f"The circle is infeasible at {case.max_heading_rate_deg_s:g} deg/s in this wind: every plant leaves it, by "
+            f"The circle is infeasible at {case.max_heading_rate_deg_s:g} deg/s in this wind; every plant leaves it, "
+            f"by "
             f"{_of(least, 'range_error_peak_m', 'm')} ({least.plant}, {least.law}) to "
             f"{_of(worst, 'range_error_peak_m', 'm')} ({worst.plant}, {worst.law}) in the last half."
         )

@@ -8,8 +8,8 @@ from typing import Annotated, Literal, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 import aircraft
+from autopilot.guidance import Law
 from autopilot.quantities import About, Metres, Seconds
-from autopilot.standoff import StandoffLaw
 from harness.kinematic import Kinematic
 from harness.plant import Plant, Start
 from harness.target import Target
@@ -43,11 +43,13 @@ class Flight:
     """One flight. Defaults are the paper's stationary case (Table 1)."""
 
     plant: Annotated[Literal["kinematic", "sixdof"], About("everything below the heading-rate command")]
-    law: StandoffLaw
+    law: Law
     aircraft: Annotated[str, About("an airframe by name, or its folder")] = "ultra_stick_25e"
     duration: Annotated[Seconds, Gt(0), Le(1e6), About("length of the flight")] = 100.0
     guidance_period: Annotated[Seconds, Gt(0), Le(1e3), About("the law's command is held in between")] = 0.05
-    step: Annotated[Seconds, Ge(1e-5), Le(0.05), About("of the 6-DOF simulation; periods are whole multiples of it")] = 0.005
+    step: Annotated[
+        Seconds, Ge(1e-5), Le(0.05), About("of the 6-DOF simulation; periods are whole multiples of it")
+    ] = 0.005
     seed: Annotated[int, Ge(0), About("of everything random")] = 0
     start: Start = field(default_factory=Start)
     target: Target = field(default_factory=Target)

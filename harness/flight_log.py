@@ -26,7 +26,7 @@ class FlightLog:
     table: NDArray[np.float64]  # (rows, len(COLUMNS))
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
-        return self.table[:, COLUMNS.index(column)]  # type: ignore[no-any-return]
+        return self.table[:, COLUMNS.index(column)]
 
     def __len__(self) -> int:
         return len(self.table)

@@ -8,7 +8,6 @@ from harness.plant import Flying, Start
 from harness.state import State
 from harness.wind import Wind
 
-
 _NO_AIRFRAME = State(*(math.nan,) * len(State._fields))[9:-3]  # from bank to throttle
 
 

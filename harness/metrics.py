@@ -98,7 +98,7 @@ def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | 
 
 def _correlation(a: Array, b: Array) -> float:
     a, b = a - a.mean(), b - b.mean()
-    return float(a @ b / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
+    return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-300))
 
 
 def _vertex(y: Array) -> float:
@@ -109,7 +109,7 @@ def _vertex(y: Array) -> float:
 
 def _turn_ratio(log: FlightLog) -> float | None:
     coordinated = GRAVITY * np.tan(log["bank"]) / log["airspeed"]
-    if not _rms(coordinated) or (_rms(coordinated) or 0.0) < LEAST_EXCITATION:
+    if (_rms(coordinated) or 0.0) < LEAST_EXCITATION:
         return None
     return float(coordinated @ log["heading_rate"] / (coordinated @ coordinated))
 

@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
+from harness.flight import Flight
 from harness.flight_log import COLUMNS, FlightLog
 from harness.plant import Outcome
 
@@ -27,28 +28,43 @@ Logs = Mapping[str, FlightLog]
 _TIMELINE = "sim_time"
 _COLOURS = ((125, 165, 215), (255, 150, 40), (100, 215, 110), (230, 110, 230), (240, 220, 80), (90, 225, 235))
 _TARGET_COLOUR = (235, 75, 85)
+_WIND_COLOUR = (220, 220, 220)
 _GREY = (125, 125, 125)
-_MOST_WITH_COMMANDS = 3  # flights; of more, the commands would hide what was flown
+_MOST_WITH_COMMANDS = 2  # flights; of more, the commands would hide what was flown
+_MOST_WITH_LEGENDS = 3  # flights; of more, one legend for all plots: a flight has one colour everywhere
 _ELEVATION = math.radians(55.0)  # of the eye above the scene
-_HALF_VIEW = math.tan(math.radians(24.0))  # Rerun's eye opens 55 deg; a margin, and a pane narrower than high
+_HALF_VIEW = math.tan(math.radians(25.0))  # Rerun's eye opens 55 deg from top to bottom
+_DEG = 180.0 / math.pi
 
 
 class _Plot(NamedTuple):
-    """A strip of curves over time: the column flown, the one commanded if any, and one SI unit in `unit`."""
+    """A strip of curves over time: columns of the log in `unit`, one SI unit being `scale` of it."""
 
-    name: str
+    title: str
     unit: str
     scale: float
     flown: str
     command: str | None = None
+    bound: str = ""  # what +-`bound_of` a flight is called
+    bound_of: Callable[[Flight], float] | None = None
 
 
-_DEG = 180.0 / math.pi
-_RANGE_ERROR = _Plot("Range error", "m", 1.0, "range_error")
-_HEADING_RATE = _Plot("Heading rate", "deg/s", _DEG, "heading_rate", "heading_rate_command")
+class _Curve(NamedTuple):
+    """A line in a plot."""
+
+    legend: str
+    colour: Colour
+    width: float
+    time: Array
+    values: Array
+
+
 _PLOTS = (
-    _RANGE_ERROR,
-    _HEADING_RATE,
+    _Plot("Range error", "m", 1.0, "range_error", None, "tolerance", lambda flight: flight.metrics.tolerance),
+    _Plot(
+        *("Heading rate", "deg/s", _DEG, "heading_rate", "heading_rate_command"),
+        *("limit", lambda flight: flight.law.max_heading_rate),
+    ),
     _Plot("Bank", "deg", _DEG, "bank", "bank_command"),
     _Plot("Sideslip", "deg", _DEG, "sideslip"),
     _Plot("Sliding variable", "rad", 1.0, "sliding_variable"),
@@ -60,16 +76,19 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "") -> None
 
     The first flight is the reference, drawn wide and pale under the others; target, circle and wind are its own.
     """
+    plots = {plot: curves for plot in _PLOTS if (curves := _curves(plot, logs))}
     recording = rr.RecordingStream("standoff-harness", send_properties=False)  # the hour of writing says nothing
     memory = recording.memory_recording()  # Rerun's own file sink waits for ever when the disk is full
     recording.set_log_time_enabled(False)
-    recording.send_blueprint(_layout(logs))
+    recording.send_blueprint(_layout(logs, plots))
     recording.send_recording_name(title)
     _log(recording, "/notes", rr.TextDocument(f"## {title}\n\n{notes}", media_type=rr.MediaType.MARKDOWN))
     _log_surroundings(recording, next(iter(logs.values())))
-    _log_bounds(recording, logs)
     for i, (name, log) in enumerate(logs.items()):
-        _log_flight(recording, name, log, _COLOURS[i % len(_COLOURS)], i == 0, len(logs) <= _MOST_WITH_COMMANDS)
+        _log_flight(recording, name, log, *_style(i, len(logs)))
+    for plot, curves in plots.items():
+        for i, curve in enumerate(curves):  # Rerun draws in the order of the entities' names
+            _log_curve(recording, f"/plots/{plot.flown}/{i:02}", curve)
     content = memory.drain_as_bytes()
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
@@ -86,11 +105,11 @@ def read_recording(path: Path, flight: str | None = None) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    path.open("rb").close()  # for the OSError: Rerun has one message for all that is wrong with a file
+    path.open("rb").close()  # for the OSError: Rerun raises RuntimeError for all that is wrong with a file
     try:
         chunks = RrdReader(path).stream().filter(content="/runs/**").to_chunks()
     except RuntimeError as error:
-        raise ValueError(f"{path} is no whole recording: {error}") from error
+        raise ValueError(f"{path} is no recording, or not a whole one: {error}") from error
     columns: dict[str, list[str]] = {}
     rows: dict[str, list[Array]] = {}
     for chunk in chunks:
@@ -100,13 +119,14 @@ def read_recording(path: Path, flight: str | None = None) -> "pd.DataFrame":
                 columns[name] = batch.column("SeriesLines:names").flatten().to_pylist()
             else:
                 rows.setdefault(name, []).append(batch.column("Scalars:scalars").flatten().to_numpy())
-    names = sorted(columns)
-    if flight is None and len(names) == 1:
-        flight = names[0]
-    if flight not in columns:
-        raise ValueError(f"{path} holds {f'no flight {flight!r}' if flight else 'several flights'}: {', '.join(names)}")
-    table = np.concatenate([*rows.get(flight, []), np.empty(0)]).reshape(-1, len(columns[flight]))
-    return pd.DataFrame(table, columns=columns[flight])
+    held = ", ".join(sorted(columns)) or "none"
+    if flight is None and len(columns) != 1:
+        raise ValueError(f"{path}: which flight? It holds {held}")
+    name = flight if flight is not None else held
+    if name not in columns:
+        raise ValueError(f"{path}: no flight {name!r}, it holds {held}")
+    table = np.concatenate([*rows.get(name, []), np.empty(0)]).reshape(-1, len(columns[name]))
+    return pd.DataFrame(table, columns=columns[name])
 
 
 def _log(recording: rr.RecordingStream, entity: str, what: rr.AsComponents) -> None:
@@ -120,118 +140,155 @@ def _send(recording: rr.RecordingStream, entity: str, time: Array, columns: Iter
     recording.send_columns(entity, [rr.TimeColumn(_TIMELINE, duration=stamps)], columns, strict=True)
 
 
-def _send_rows(recording: rr.RecordingStream, entity: str, time: Array, rows: Array) -> None:
-    """Many columns as one: a vector per time stamp takes a third of the room that a column each would."""
-    _send(recording, entity, time, rr.Scalars.columns(scalars=rows.ravel()).partition([rows.shape[1]] * len(rows)))
-
-
-def _entity(flight: str, *parts: str) -> str:
-    return rr.new_entity_path(["runs", flight, *parts])
-
-
-def _log_flight(
-    recording: rr.RecordingStream, name: str, log: FlightLog, colour: Colour, reference: bool, commands: bool
-) -> None:
-    _log(recording, _entity(name, "log"), rr.SeriesLines(names=COLUMNS))
-    _send_rows(recording, _entity(name, "log"), log["time"], log.table)
-    for plot in _drawn([log]):
-        flown, drab = f"{name} [{plot.unit}]", tuple((part + 2 * grey) // 3 for part, grey in zip(colour, _GREY, strict=True))
-        width = 4.0 if reference else 1.5
-        if plot.command and commands:
-            rows = np.column_stack([log[plot.command], log[plot.flown]])
-            style = rr.SeriesLines(names=[f"{name} command [{plot.unit}]", flown], colors=[drab, colour], widths=[1.0, width], aggregation_policy=[rr.components.AggregationPolicy.MinMax]*2)
-        else:
-            rows = log[plot.flown][:, np.newaxis]
-            style = rr.SeriesLines(names=flown, colors=colour, widths=width, aggregation_policy=rr.components.AggregationPolicy.MinMax)
-        _log(recording, _entity(name, plot.flown), style)
-        _send_rows(recording, _entity(name, plot.flown), log["time"], rows * plot.scale)
-    track = _track(log)
-    _log(recording, _entity(name, "track"), rr.LineStrips3D([track], colors=colour, radii=rr.Radius.ui_points(2.2 if reference else 0.9)))
-    _log(recording, _entity(name, "aircraft"), _airframe(log.flight.law.standoff / 4.0, colour))
-    _send(recording, _entity(name, "aircraft"), log["time"], rr.Transform3D.columns(translation=track, quaternion=_attitude(log)))
+def _log_flight(recording: rr.RecordingStream, name: str, log: FlightLog, colour: Colour, width: float) -> None:
+    """The log as it is, for `read_recording`, and the aircraft on its track."""
+    entity, time, track = rr.new_entity_path(["runs", name]), log["time"], _track(log)
+    _log(recording, f"{entity}/log", rr.SeriesLines(names=COLUMNS))
+    rows = rr.Scalars.columns(scalars=log.table.ravel()).partition([len(COLUMNS)] * len(log))
+    _send(recording, f"{entity}/log", time, rows)  # as vectors: a third of the room that an entity per column takes
+    _log(recording, f"{entity}/track", rr.LineStrips3D([track], colors=colour, radii=_points(0.5 * width)))
+    _log(recording, f"{entity}/aircraft", _airframe(log.flight.law.standoff / 4.0, colour))
+    pose = rr.Transform3D.columns(translation=track, quaternion=_attitude(log))
+    _send(recording, f"{entity}/aircraft", time, pose)
     if log.outcome is not Outcome.COMPLETED:
-        text = f"{name}: {log.outcome}, {log.reason}"
-        _log(recording, _entity(name, "end"), rr.Points3D(track[-1:], colors=colour, radii=rr.Radius.ui_points(6), labels=[text], show_labels=True))
-        _send(recording, _entity(name, "end"), log["time"][-1:], rr.TextLog.columns(text=[text], level=["WARN"]))
+        mark = rr.Points3D(track[-1:], colors=colour, radii=_points(5.0), labels=[log.outcome.value])
+        _log(recording, f"{entity}/end", mark)
+        event = rr.TextLog.columns(text=[f"{name}: {log.outcome}, {log.reason}"], level=["WARN"])
+        _send(recording, f"{entity}/end", np.append(0.0, time)[-1:], event)
+
+
+def _log_curve(recording: rr.RecordingStream, entity: str, curve: _Curve) -> None:
+    style = rr.SeriesLines(
+        names=curve.legend,
+        colors=curve.colour,
+        widths=curve.width,
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,  # the default halves the peaks
+    )
+    _log(recording, entity, style)
+    _send(recording, entity, curve.time, rr.Scalars.columns(scalars=curve.values))
+
+
+def _log_surroundings(recording: rr.RecordingStream, log: FlightLog) -> None:
+    """The target on the ground, and above it the circle and the wind's way in 20 s, at the flight's height."""
+    _log(recording, "/", rr.ViewCoordinates.FRD)
+    ground, centre = _ground(log), (0.0, 0.0, -log.flight.start.altitude)
+    _log(recording, "/target/track", rr.LineStrips3D([ground], colors=_TARGET_COLOUR, radii=_points(1.0)))
+    _send(recording, "/target/position", log["time"], rr.Transform3D.columns(translation=ground))
+    point = rr.Points3D([(0.0, 0.0, 0.0)], colors=_TARGET_COLOUR, radii=_points(5.0), labels=["target"])
+    _log(recording, "/target/position/point", point)
+    lines = [_circle(log, 121) + centre, ((0.0, 0.0, 0.0), centre)]
+    _log(recording, "/target/position/circle", rr.LineStrips3D(lines, colors=_TARGET_COLOUR, radii=_points(0.7)))
+    if any(log.flight.wind.steady):
+        wind = np.array((*log.flight.wind.steady, 0.0))
+        arrow = rr.Arrows3D(vectors=[20.0 * wind], origins=[centre], colors=_WIND_COLOUR, radii=_points(2.5))
+        _log(recording, "/target/position/wind", arrow)
+        label = rr.Points3D([26.0 * wind + centre], colors=_WIND_COLOUR, radii=0.0, labels=[f"wind {np.hypot(*wind[:2]):.2g} m/s"])
+        _log(recording, "/target/position/wind/label", label)
+
+
+def _airframe(span: float, colour: Colour) -> rr.Mesh3D:
+    """Four flat triangles: fuselage, wing, tailplane, fin. Body axes, m."""
+    fuselage = ((0.5, 0.0, 0.0), (-0.5, 0.06, 0.0), (-0.5, -0.06, 0.0))
+    wing = ((0.2, 0.0, 0.0), (-0.1, 0.5, 0.0), (-0.1, -0.5, 0.0))
+    tailplane = ((-0.3, 0.0, 0.0), (-0.5, 0.2, 0.0), (-0.5, -0.2, 0.0))
+    fin = ((-0.25, 0.0, 0.0), (-0.5, 0.0, 0.0), (-0.5, 0.0, -0.2))
+    corners = span * np.array([*fuselage, *wing, *tailplane, *fin])
+    return rr.Mesh3D(vertex_positions=corners, triangle_indices=np.arange(12).reshape(4, 3), albedo_factor=colour)
+
+
+def _attitude(log: FlightLog) -> Array:
+    """Body (FRD) to world as quaternions x, y, z, w. What a plant has not is level, and its nose along its heading."""
+    yaw = np.where(np.isnan(log["yaw"]), log["heading"], log["yaw"])
+    angles = np.column_stack([yaw, np.nan_to_num(log["pitch"]), np.nan_to_num(log["bank"])])
+    return Rotation.from_euler("ZYX", angles).as_quat()
 
 
 def _track(log: FlightLog) -> Array:
     return np.column_stack([log["north"], log["east"], -log["altitude"]])
 
 
-def _attitude(log: FlightLog) -> Array:
-    """Body (FRD) to world as quaternions x, y, z, w. Where a plant has a heading only, its aircraft flies level along it."""
-    yaw = np.where(np.isnan(log["yaw"]), log["heading"], log["yaw"])
-    angles = np.column_stack([yaw, np.nan_to_num(log["pitch"]), np.nan_to_num(log["bank"])])
-    return Rotation.from_euler("ZYX", angles).as_quat()
+def _ground(log: FlightLog) -> Array:
+    return np.column_stack([log["target_north"], log["target_east"], np.zeros(len(log))])
 
 
-def _drawn(logs: Iterable[FlightLog]) -> list[_Plot]:
-    """The plots that have something to show: NaN is what a plant has not."""
-    return [plot for plot in _PLOTS if any(np.isfinite(log[plot.flown]).any() for log in logs)]
+def _circle(log: FlightLog, corners: int) -> Array:
+    angle = np.linspace(0.0, 2.0 * math.pi, corners)
+    return log.flight.law.standoff * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(corners)])
 
 
-def _airframe(span: float, colour: Colour) -> rr.Mesh3D:
-    """Fuselage, wing and tails as flat triangles: forward, right, down."""
-    v = span*np.array([[.5,0,0],[-.5,.06,0],[-.5,-.06,0], [.2,0,0],[-.1,.5,0],[-.1,-.5,0],[-.3,0,0],[-.5,.2,0],[-.5,-.2,0],[-.25,0,0],[-.5,0,0],[-.5,0,-.2]])
-    t=[[0,1,2],[3,4,5],[6,7,8],[9,10,11]]
-    return rr.Mesh3D(vertex_positions=v,triangle_indices=t,albedo_factor=colour)
+def _points(radius: float) -> float:
+    return float(rr.Radius.ui_points(radius))
 
 
-def _log_bounds(recording, logs) -> None:
-    end = _end(logs)
-    limit = max(log.flight.law.max_heading_rate for log in logs.values())
-    tol = max(log.flight.metrics.tolerance for log in logs.values())
-    for plot, name, value in ((_RANGE_ERROR, "tolerance", tol), (_HEADING_RATE, "limit", limit)):
-        e = f"/bounds/{plot.flown}"
-        _log(recording, e, rr.SeriesLines(names=[f"{name} [{plot.unit}]"]*2, colors=[_GREY]*2, widths=[1.0]*2, aggregation_policy=[rr.components.AggregationPolicy.MinMax]*2))
-        _send_rows(recording, e, np.array([0.0, end]), np.array([[value,-value]]*2)*plot.scale)
+def _style(i: int, flights: int) -> tuple[Colour, float]:
+    """Colour and line width of the i-th flight; alone, the reference need not be wide."""
+    return _COLOURS[i % len(_COLOURS)], 3.5 if i == 0 and flights > 1 else 1.5
 
 
-def _end(logs): return max(float(log["time"][-1]) for log in logs.values())
+def _curves(plot: _Plot, logs: Logs) -> list[_Curve]:
+    """What there is to draw, in the order of drawing. A column of NaN is what the plant has not."""
+    curves = []
+    for i, (name, log) in enumerate(logs.items()):
+        colour, width = _style(i, len(logs))
+        drab = (colour[0] + 2 * _GREY[0]) // 3, (colour[1] + 2 * _GREY[1]) // 3, (colour[2] + 2 * _GREY[2]) // 3
+        if plot.command and len(logs) <= _MOST_WITH_COMMANDS:
+            curves.append(_Curve(f"{name} command [{plot.unit}]", drab, 1.0, log["time"], plot.scale * log[plot.command]))
+        curves.append(_Curve(f"{name} [{plot.unit}]", colour, width, log["time"], plot.scale * log[plot.flown]))
+    curves = [curve for curve in curves if np.isfinite(curve.values).any()]
+    if curves and plot.bound_of:
+        time = np.array([0.0, _end(logs)])
+        bounds = sorted({sign * plot.scale * plot.bound_of(log.flight) for log in logs.values() for sign in (-1.0, 1.0)})
+        curves[:0] = [_Curve(f"{plot.bound} [{plot.unit}]", _GREY, 1.0, time, np.full(2, bound)) for bound in bounds]
+    return curves
 
 
-def _log_surroundings(recording, log) -> None:
-    _log(recording, "/", rr.ViewCoordinates.FRD)
-    R, height = log.flight.law.standoff, log.flight.start.altitude
-    ground = np.column_stack([log["target_north"], log["target_east"], np.zeros(len(log))])
-    angle = np.linspace(0, 2*np.pi, 181)
-    circle = np.column_stack([R*np.cos(angle), R*np.sin(angle), np.full(181,-height)])
-    _log(recording, "/target/track", rr.LineStrips3D([ground], colors=_TARGET_COLOUR, radii=rr.Radius.ui_points(1.0)))
-    _send(recording, "/target/position", log["time"], rr.Transform3D.columns(translation=ground))
-    _log(recording, "/target/position/point", rr.Points3D([[0,0,0]], colors=_TARGET_COLOUR, radii=rr.Radius.ui_points(5.0),labels=["target"],show_labels=True))
-    _log(recording, "/target/position/circle", rr.LineStrips3D([circle,[[0,0,0],[0,0,-height]]], colors=_TARGET_COLOUR, radii=rr.Radius.ui_points(.7)))
-    W=np.hypot(*log.flight.wind.steady)
-    if W:
-        n,e=log.flight.wind.steady
-        _log(recording, "/target/position/wind", rr.Arrows3D(vectors=[[20*n,20*e,0]],origins=[[0,0,-height]],labels=[f"wind {W:.3g} m/s"],colors=(200,200,200),radii=rr.Radius.ui_points(2.)))
+def _end(logs: Logs) -> float:
+    return float(np.concatenate([log["time"] for log in logs.values()]).max(initial=1.0))
 
 
-def _layout(logs) -> rrb.Blueprint:
-    end = _end(logs)
-    first = next(iter(logs.values()))
-    R = first.flight.law.standoff
-    tgt = np.column_stack([first["target_north"], first["target_east"], np.zeros(len(first))])
-    up=[0,0,first.flight.start.altitude]
-    pts = np.vstack([_track(l) for l in logs.values()] + [tgt] + [tgt -up + [a,b,0] for a in (-R,R) for b in (-R,R)])
-    c = (pts.min(0)+pts.max(0))/2
-    el=_ELEVATION; f=_HALF_VIEW
-    d=pts-c
-    toward=-d[:,0]*math.cos(el)-d[:,2]*math.sin(el)
-    upw=d[:,0]*math.sin(el)-d[:,2]*math.cos(el)
-    dist=(toward+np.maximum(abs(d[:,1]),abs(upw))/f).max()
-    eye=c+dist*np.array([-math.cos(el),0,-math.sin(el)])
-    scene = rrb.Spatial3DView(origin="/", contents=["/target/**",*(f"{_entity(n)}/{x}" for n in logs for x in ("track","aircraft","end"))], name="Scene", eye_controls=rrb.EyeControls3D(position=eye, look_target=c, eye_up=(0,0,-1)), line_grid=rrb.LineGrid3D(spacing=100.0))
-    chars=max(map(len,logs))+16
-    g=min(.5,(40+6.1*chars)/830)
-    x = rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(rrb.TimeRangeBoundary.absolute(seconds=0.0), rrb.TimeRangeBoundary.absolute(seconds=end/(1-g))))
-    lim=max(log.flight.law.max_heading_rate for log in logs.values())*_DEG
-    def rng(p):
-        if p is _HEADING_RATE: return rrb.ScalarAxis(range=(-1.3*lim,1.3*lim))
-        if p is _RANGE_ERROR: return rrb.ScalarAxis(range=(-.2*R,.5*R))
-        return None
-    plots=[rrb.TimeSeriesView(origin="/", contents=[f"/bounds/{p.flown}",*(_entity(n,p.flown) for n in logs)], name=f"{p.name} [{p.unit}]", axis_x=x, axis_y=rng(p), plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop)) for p in _drawn(logs.values())]
-    left=[scene, rrb.TextDocumentView(origin="/notes", name="Notes")]
-    if any(l.outcome is not Outcome.COMPLETED for l in logs.values()):
-        left.append(rrb.TextLogView(origin="/runs",name="Events"))
-    return rrb.Blueprint(rrb.Horizontal(rrb.Vertical(*left, row_shares=[5,2,1][:len(left)]), rrb.Vertical(*plots), column_shares=[2,3]), rrb.TimePanel(state="collapsed", timeline=_TIMELINE, playback_speed=10.0, play_state="paused"), rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False, auto_layout=False)
+def _layout(logs: Logs, plots: Mapping[_Plot, list[_Curve]]) -> rrb.Blueprint:
+    """Left the scene over the notes, right the plots over the whole flight, with room for the legends beside the curves."""
+    legends = [len({c.legend for c in curves}) for curves in plots.values()]
+    longest = max(len(curve.legend) for curves in plots.values() for curve in curves)
+    share = min(0.5, (40.0 + 6.1 * longest) / 830.0)
+    begin, end = rrb.TimeRangeBoundary.absolute(seconds=0.0), rrb.TimeRangeBoundary.absolute(seconds=_end(logs)/(1-share))
+    axis = rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(begin, end))
+    few = len(logs) <= _MOST_WITH_LEGENDS
+    strips = [rrb.TimeSeriesView(origin=f"/plots/{plot.flown}", name=f"{plot.title} [{plot.unit}]", axis_x=axis, axis_y=_axis(plot, curves, logs), plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=few or i == 0)) for i, (plot, curves) in enumerate(plots.items())]
+    left = [_scene(logs), rrb.TextDocumentView(origin="/notes", name="Notes")]
+    if any(log.outcome is not Outcome.COMPLETED for log in logs.values()):
+        left.append(rrb.TextLogView(origin="/runs", name="Events"))
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Vertical(*left, row_shares=[6.0, 3.0, 1.5][:len(left)]), rrb.Vertical(*strips, row_shares=[max(4, n) if few or not i else 4 for i, n in enumerate(legends)]), column_shares=[2,3]),
+        rrb.TimePanel(state="collapsed", timeline=_TIMELINE, playback_speed=10.0, play_state="paused"),
+        rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False, auto_layout=False)
+
+
+def _axis(plot, curves, logs) -> rrb.ScalarAxis | None:
+    if plot.flown == "heading_rate":
+        limit = 1.3 * max(curve.values.max() for curve in curves if curve.legend.startswith(plot.bound))
+        return rrb.ScalarAxis(range=(-limit, limit))
+    if plot.flown == "range_error":
+        near = 0.5 * max(log.flight.law.standoff for log in logs.values())
+        r = np.concatenate([np.r_[np.clip(log["range_error"], -near, near), log["range_error"][len(log)//2:]] for log in logs.values()])
+        lo, hi = r.min(initial=-.1*near), r.max(initial=.1*near)
+        return rrb.ScalarAxis(range=(lo-.08*(hi-lo), hi+.08*(hi-lo)))
+    return None
+
+
+def _scene(logs: Logs) -> rrb.Spatial3DView:
+    """Seen from the south, from above the ground, just far enough to see everything."""
+    reference = next(iter(logs.values()))
+    up = (0.0, 0.0, -reference.flight.start.altitude)
+    ground = np.vstack([(*reference.flight.target.position, 0.0), _ground(reference)[::20]])
+    rim = (ground[:, np.newaxis] + _circle(reference, 25) + up).reshape(-1, 3)
+    points = np.vstack([ground, rim, *(_track(log) for log in logs.values())])
+    c, s = math.cos(_ELEVATION), math.sin(_ELEVATION)
+    axes = np.array([(0.0, 1.0, 0.0), (s, 0.0, -c), (-c, 0.0, -s)])  # of the picture: right, up, towards the eye
+    x, y, z = axes @ points.T
+    # The eye at (X, Y, Z) sees a point where |x - X| and |y - Y| are at most (Z - z) HALF_VIEW
+    right, left, top, bottom = (float((side + _HALF_VIEW * z).max()) for side in (x, -x, y, -y))
+    eye = np.array([0.5*(right - left), 0.5*(top - bottom), 0.5*max(right+left, top+bottom)/_HALF_VIEW])
+    look = eye * (1, 1, 0) + (0,0,z.mean())
+    controls = rrb.EyeControls3D(position=eye @ axes, look_target=look @ axes, eye_up=(0.0, 0.0, -1.0))
+    return rrb.Spatial3DView(contents=["/target/**", *(f"{rr.new_entity_path(['runs', n])}/{x}" for n in logs for x in ("track", "aircraft", "end"))], name="Scene", eye_controls=controls, line_grid=rrb.LineGrid3D(spacing=100.0))

@@ -139,8 +139,7 @@ def flight_from_document(document: Mapping[str, object]) -> Flight:
 def document(flight: Flight) -> dict[str, Any]:
     """The flight as a [flight] table in file units: every key, fit for JSON. `flight_from_document` undoes it."""
     name = next(name for name, kind in LAWS.items() if kind.value is type(flight.law))
-    table = _written(flight)
-    return {**table, "law": {"name": name, **table["law"]}}
+    return {**_written(flight), "law": {"name": name, **_written(flight.law)}}
 
 
 def put(document: dict[str, Any], name: str, value: object) -> Key:
@@ -299,7 +298,7 @@ def _law_table(name: str | None, gains_given: bool) -> _Table:
     value, sets = LAWS[name].value, {**LAWS[name].gain_sets, _CUSTOM: {}}
 
     def make(name: str, gains: str = "paper", **given: float | str) -> object:
-        return value(**{"gains": gains, **sets[gains], **given})  # type: ignore[arg-type]  # as its table checked
+        return value(**{"gains": gains, **sets[gains], **given})
 
     own = {key: replace(s, required=s.required and gains_given) for key, s in _table(value).settings.items()}
     return _Table({**named, **own, "gains": _Setting(Literal[*sets], "gains", required=False)}, make)

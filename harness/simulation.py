@@ -14,7 +14,7 @@ from harness.target import TargetState
 
 
 def simulate(flight: Flight) -> FlightLog:
-    """Flies the flight. ValueError (`PlantError` from the plant) when it cannot start; once started it always ends in a log."""
+    """Flies the flight: once started it always ends in a log. ValueError, or `PlantError`, when it cannot."""
     for problem in problems(flight):
         raise ValueError(f"{problem.name}: {problem.message}")
     target, law = flight.target.start(), flight.law.start()

@@ -51,7 +51,7 @@ class _LoadLog(jsbsim.FGLogger):
 
 _load_log = _LoadLog()
 jsbsim.set_logger(_load_log)
-jsbsim.FGJSBBase().debug_lvl = 0
+jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # as its stub has it
 
 
 class ModelError(RuntimeError):
@@ -65,7 +65,7 @@ def _properties(airframe: Path) -> list[str]:
     return sorted({name for text in texts for name in _PROPERTY.findall(text)})
 
 
-class NoTrim(ValueError):
+class NoTrimError(ValueError):
     """There is no steady level flight at this airspeed."""
 
 
@@ -94,9 +94,14 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
 
 def write(fdm: jsbsim.FGFDMExec, name: str, value: float) -> None:
     """Sets a property that exists: JSBSim creates one for every mistyped name."""
-    if not fdm.get_property_manager().hasNode(name):
+    _node(fdm, name).set_double_value(value)
+
+
+def _node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
+    node = fdm.get_property_manager().get_node(name)
+    if node is None:
         raise ModelError(f"the model has no property {name!r}")
-    fdm[name] = value
+    return node
 
 
 class Trim(NamedTuple):
@@ -111,7 +116,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
     """Puts the aircraft at `start`, level and unaccelerated, and gives the trim that does it.
 
     Newton's method on the accelerations that JSBSim reports, with the surfaces placed directly: their actuators do not
-    run before engagement, so no lag falsifies the result. Raises `NoTrim` where there is none below 30 deg of pitch.
+    run before engagement, so no lag falsifies the result. Raises `NoTrimError` where there is none.
     """
     _place(fdm, start, wind)
     x = np.array([0.05, 0.0, 0.5])
@@ -125,7 +130,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
     residual = _accelerations(fdm, x)
     found = Trim(*x.tolist())
     if not (np.abs(residual).max() < 1e-8 and 0.0 < found.throttle < 1.0 and abs(found.pitch) < math.pi / 6):
-        raise NoTrim(f"no level trim at {start.airspeed:g} m/s")
+        raise NoTrimError(f"no level trim at {start.airspeed:g} m/s")
     return found
 
 
@@ -223,22 +228,20 @@ class SixDof:
         fdm = load(self.airframe, self.step)
         try:
             trimmed = trim(fdm, start, wind)
-        except NoTrim as error:
-            raise PlantError(
-                "start.airspeed",
-                f"{error}; {self.airframe.name} flies from {envelope['V_min']['v']:g} to {envelope['V_max']['v']:g} m/s",
-            ) from None
+        except NoTrimError as error:
+            slowest, fastest = envelope["V_min"]["v"], envelope["V_max"]["v"]
+            allowed = f"{self.airframe.name} flies from {slowest:g} to {fastest:g} m/s"
+            raise PlantError("start.airspeed", f"{error}; {allowed}") from None
         engage(fdm, trimmed, start, self.rate_trim)
         return _SixDofFlying(fdm, self.step, start, wind, stall)
 
 
 class _SixDofFlying:
     def __init__(self, fdm: jsbsim.FGFDMExec, step: float, start: Start, wind: Wind, stall: float) -> None:
-        manager = fdm.get_property_manager()
         self._run: Callable[[], bool] = fdm.run
-        self._readers = [manager.get_node(name).get_double_value for name in _READ]
+        self._readers = [_node(fdm, name).get_double_value for name in _READ]
         self._velocity_north, self._velocity_east = self._readers[3:5]
-        self._command = manager.get_node("inner-loop/command/heading-rate-rad_s").set_double_value
+        self._command = _node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
         self._step = step
         self._north, self._east = start.position
         self._wind = wind.steady
@@ -291,7 +294,7 @@ class _SixDofFlying:
 
 
 def wind_triangle_error(airframe: Path, start: Start, wind: Wind) -> float:
-    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air by the attitude from body axes."""
+    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air from the body's axes."""
     fdm = load(airframe, 0.005)
     engage(fdm, trim(fdm, start, wind), start, rate_trim=True)
     for _ in range(400):

@@ -7,7 +7,7 @@ NAN = math.nan
 
 
 class State(NamedTuple):
-    """The aircraft at one moment. SI, rad; north-east-down from the flight's origin; NaN where a plant has no such thing.
+    """The aircraft at one moment. SI, rad; NED from the flight's origin; NaN where a plant has no such thing.
 
     `heading` is psi_a, the direction of (ground velocity - steady wind), `yaw` the nose. Aileron positive rolls right,
     elevator positive pitches down, rudder positive yaws left. Sideslip is positive with the wind from the right.

@@ -10,7 +10,6 @@ from annotated_types import Ge, Le
 
 from autopilot.quantities import About, Degrees, DegreesPerSecond, Metres, MetresPerSecond, MetresPerSecond2, Seconds
 
-
 _FASTEST_TURN = math.radians(1000.0)  # far beyond any target; keeps the closed form's angles meaningful
 
 
@@ -60,7 +59,9 @@ class Target:
         n, e, speed, heading = *self.position, self.speed, self.heading
         for i, begin in enumerate(cuts):
             active = [s for s in self.segments if s.from_ <= begin < s.to]
-            leg = Leg(begin, n, e, speed, heading, sum(s.acceleration for s in active), sum(s.turn_rate for s in active))
+            leg = Leg(
+                begin, n, e, speed, heading, sum(s.acceleration for s in active), sum(s.turn_rate for s in active)
+            )
             legs.append(leg)
             if i + 1 < len(cuts):
                 length = cuts[i + 1] - begin

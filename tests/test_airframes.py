@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import aircraft
 from aircraft.write_models import jsbsim_model
 from harness.plant import Start
-from harness.sixdof import FT, SLUG, NoTrim, engage, load, trim
+from harness.sixdof import FT, SLUG, NoTrimError, engage, load, trim
 from harness.wind import Wind
 
 LBF = 4.4482216152605  # N
@@ -80,7 +80,10 @@ def aerodynamics(data: dict[str, Any], c: Condition, rho: float) -> tuple[Vector
     S, b, chord = (data["ref"][x]["v"] for x in ("S", "b", "c"))
     p, q, r = c.p * b / (2 * c.V), c.q * chord / (2 * c.V), c.r * b / (2 * c.V)
     rudder = c.d_r if data["meta"]["has_rudder"] else 0.0
-    low, high = math.exp(-k["stall_M"] * (c.alpha - k["alpha_stall"])), math.exp(k["stall_M"] * (c.alpha + k["alpha_stall"]))
+    low, high = (
+        math.exp(-k["stall_M"] * (c.alpha - k["alpha_stall"])),
+        math.exp(k["stall_M"] * (c.alpha + k["alpha_stall"])),
+    )
     stalled = (1 + low + high) / ((1 + low) * (1 + high))
     attached = k["CL0"] + k["CLa"] * c.alpha
     plate = 2 * math.copysign(1.0, c.alpha) * math.sin(c.alpha) ** 2 * math.cos(c.alpha)
@@ -135,7 +138,9 @@ def test_forces_moments_and_accelerations_are_those_of_the_data(name: str, condi
         assert its_moment == pytest.approx(moment, rel=1e-6, abs=1e-6)
 
     m = data["mass"]
-    J = np.array([[m["Ixx"]["v"], 0.0, -m["Ixz"]["v"]], [0.0, m["Iyy"]["v"], 0.0], [-m["Ixz"]["v"], 0.0, m["Izz"]["v"]]])
+    J = np.array(
+        [[m["Ixx"]["v"], 0.0, -m["Ixz"]["v"]], [0.0, m["Iyy"]["v"], 0.0], [-m["Ixz"]["v"], 0.0, m["Izz"]["v"]]]
+    )
     omega = np.array([condition.p, condition.q, condition.r])
     rotation = np.linalg.solve(J, aero[1] + push[1] - np.cross(omega, J @ omega))
     assert [fdm[f"accelerations/{x}dot-rad_sec2"] for x in "pqr"] == pytest.approx(rotation, rel=2e-4, abs=1e-4)
@@ -182,16 +187,20 @@ def test_every_number_of_an_airframe_has_a_source(name: str) -> None:
     def sourceless(table: dict[str, Any], path: str) -> list[str]:
         if "v" in table:
             return [] if table.get("src") else [path]
-        return [x for key, value in table.items() if isinstance(value, dict) for x in sourceless(value, f"{path}.{key}")]
+        return [
+            x for key, value in table.items() if isinstance(value, dict) for x in sourceless(value, f"{path}.{key}")
+        ]
 
     data = aircraft.data(aircraft.folder(name))
     judged = {key: data[key] for key in ("mass", "ref", "aero", "actuators", "envelope")}
     assert sourceless(judged, name) == []
 
 
-@pytest.mark.parametrize(("name", "airspeed"), [("ultra_stick_25e", 7.0), ("ultra_stick_25e", 60.0), ("aerosonde", 9.0)])
+@pytest.mark.parametrize(
+    ("name", "airspeed"), [("ultra_stick_25e", 7.0), ("ultra_stick_25e", 60.0), ("aerosonde", 9.0)]
+)
 def test_an_airspeed_beyond_the_airframe_is_refused(name: str, airspeed: float) -> None:
-    with pytest.raises(NoTrim):
+    with pytest.raises(NoTrimError):
         trim(load(aircraft.folder(name), STEP), Start(airspeed=airspeed), Wind())
 
 

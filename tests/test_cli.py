@@ -27,7 +27,9 @@ def file(tmp_path: Path) -> Path:
 
 
 def harness(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "harness", *map(str, words)], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-m", "harness", *map(str, words)], capture_output=True, text=True, check=False
+    )
 
 
 def test_a_flight_is_told_in_lines(file: Path) -> None:
@@ -120,7 +122,16 @@ def test_a_recording_that_cannot_be_written_is_refused_before_the_flight(
 
 
 def test_a_law_that_leaves_its_domain_is_flown_with_warnings(file: Path) -> None:
-    done = harness("fly", file, "--set", "wind.steady_mps=[8.0,0.0]", "--set", "target.speed_mps=7.0", "--set", "target.heading_deg=180")
+    done = harness(
+        "fly",
+        file,
+        "--set",
+        "wind.steady_mps=[8.0,0.0]",
+        "--set",
+        "target.speed_mps=7.0",
+        "--set",
+        "target.heading_deg=180",
+    )
     assert done.returncode == 0
     assert "INFEASIBLE" in done.stdout
     assert "Remark 1" in done.stderr

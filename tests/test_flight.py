@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -18,7 +19,9 @@ FLIGHT = Flight(plant="kinematic", law=law("smc", max_heading_rate=math.radians(
 @pytest.mark.parametrize(
     ("wind", "target_speed", "needed_deg_s"), [(0, 0, 3.72), (2, 0, 4.96), (5, 0, 7.14), (0, 7, 8.81), (0, 11, 12.70)]
 )
-def test_holding_the_circle_takes_the_rate_of_the_formula(wind: float, target_speed: float, needed_deg_s: float) -> None:
+def test_holding_the_circle_takes_the_rate_of_the_formula(
+    wind: float, target_speed: float, needed_deg_s: float
+) -> None:
     flight = replace(FLIGHT, wind=Wind(steady=(wind, 0.0)), target=Target(speed=target_speed))
     assert math.degrees(needed_heading_rate(flight)) == pytest.approx(needed_deg_s, abs=0.01)
     assert math.degrees(feasibility_margin(flight)) == pytest.approx(5.0 - needed_deg_s, abs=0.01)
@@ -36,7 +39,7 @@ def test_the_needed_rate_is_the_largest_on_a_circle_really_flown_round_a_moving_
         headings.append(math.atan2(tangent[1], tangent[0]) - math.asin(across / v_a))
         along = w[0] * tangent[0] + w[1] * tangent[1]
         rates.append((math.sqrt(v_a**2 - across**2) + along) / R_d)  # of the azimuth
-    d = [math.remainder(b - a, math.tau) / (angles[1] - angles[0]) for a, b in zip(headings, headings[1:], strict=False)]
+    d = [math.remainder(b - a, math.tau) / (angles[1] - angles[0]) for a, b in pairwise(headings)]
     flown = max(abs(slope * rate) for slope, rate in zip(d, rates, strict=False))
     flight = replace(FLIGHT, wind=Wind(steady=wind), target=Target(speed=speed))
     assert needed_heading_rate(flight) == pytest.approx(flown, rel=1e-3)

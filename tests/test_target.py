@@ -21,7 +21,13 @@ SECTION_4_3 = Target(
 
 def test_the_manoeuvring_target_of_section_4_3_reaches_its_speeds_and_headings() -> None:
     at = SECTION_4_3.start()
-    for time, speed, heading in ((299.0, 2, -45), (355.0, 7, -45), (420.0, 7, -145), (480.0, 11, -115), (900.0, 11, -95)):
+    for time, speed, heading in (
+        (299.0, 2, -45),
+        (355.0, 7, -45),
+        (420.0, 7, -145),
+        (480.0, 11, -115),
+        (900.0, 11, -95),
+    ):
         seen = at(time)
         velocity = (seen.target_velocity_north, seen.target_velocity_east)
         expected = (speed * math.cos(math.radians(heading)), speed * math.sin(math.radians(heading)))

@@ -1,5 +1,6 @@
 """`harness fly`: one flight."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -53,8 +54,9 @@ def fly(file: Path, overrides: tuple[str, ...], rrd: Path | None, as_json: bool)
     if rrd is not None:
         from harness.recording import write_recording
 
-        told = "\n".join(f"| {name} | {number(value)} |" for name, value in judged.items())
-        notes = f"{feasibility_line(flight)}\n\n| metric | |\n|---|---|\n{told}\n\n```json\n{json.dumps(result['flight'])}\n```"
+        rows = "\n".join(f"| {name} | {number(value)} |" for name, value in judged.items())
+        set_to = json.dumps(result["flight"], indent=1)
+        notes = f"{feasibility_line(flight)}\n\n| metric | |\n|---|---|\n{rows}\n\n```json\n{set_to}\n```"
         try:
             write_recording(rrd, {flight.plant: log}, file.stem, notes)
         except OSError as error:
@@ -66,7 +68,7 @@ def fly(file: Path, overrides: tuple[str, ...], rrd: Path | None, as_json: bool)
     raise SystemExit(1 if log.outcome.failed else 0)
 
 
-def _tell(result: dict[str, object], rows: dict[str, tuple[str, str]]) -> None:
+def _tell(result: Mapping[str, object], rows: dict[str, tuple[str, str]]) -> None:
     for name, (value, meaning) in rows.items():
         click.echo(f"  {name:30}{value:>9}  {click.style(meaning, dim=True)}")
     reason = f": {result['reason']}" if result["reason"] else ""
