@@ -16,11 +16,11 @@ class Observation(NamedTuple):
     velocity_north: float  # over the ground
     velocity_east: float
     airspeed: float  # measured v_a
-    nominal_airspeed: float  # commanded v_a
     heading: float
     heading_rate: float
     bank: float
     roll_rate: float
+    nominal_airspeed: float  # commanded v_a
     wind_north: float  # estimated steady wind: where the air moves to
     wind_east: float
     target_north: float

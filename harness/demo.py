@@ -88,55 +88,75 @@ def notes(flown: list[Flown]) -> str:
     return "\n".join(lines)
 
 
+SHOWN: Mapping[str, tuple[str, str, float]] = MappingProxyType(
+    {  # heading, unit in the table, how many of them make the metric's own unit
+        "convergence_time_s": ("settles", "s", 1.0),
+        "range_error_rms_m": ("error", "m rms", 1.0),
+        "range_error_peak_m": ("error", "m peak", 1.0),
+        "overshoot_m": ("overshoot", "m", 1.0),
+        "saturation_fraction": ("saturated", "%", 100.0),
+        "command_activity_deg_s2": ("activity", "deg/s2", 1.0),
+        "bank_peak_deg": ("bank", "deg peak", 1.0),
+        "sideslip_peak_deg": ("sideslip", "deg peak", 1.0),
+    }
+)
+
+
+def table(flown: list[Flown]) -> list[str]:
+    """One case side by side, a line per flight: settling to 1 m; error, saturation and activity over the last half."""
+    label = 8 + max(len(f.plant) for f in flown)
+    lines = ["".join([" " * label, *(f"{SHOWN[m][row]:>10}" for m in SHOWN)]) for row in (0, 1)]
+    for one in flown:
+        cells = (number(_scaled(one.metrics[m], SHOWN[m][2])) for m in SHOWN)
+        lines.append("".join([f"{one.law:8}{one.plant:{label - 8}}", *(f"{cell:>10}" for cell in cells)]))
+    return lines
+
+
 def differences(flown: list[Flown]) -> list[str]:
     """What differs between the plants in one case, in sentences made of the numbers alone."""
-    said = []
     case = flown[0].case
-    margin = feasibility_margin(flown[0].log.flight)
-    if margin < 0:
-        worst = max(flown, key=lambda f: f.metrics["range_error_peak_m"] or 0.0)
-        least = min(flown, key=lambda f: f.metrics["range_error_peak_m"] or 0.0)
+    said = []
+    if feasibility_margin(flown[0].log.flight) < 0:
+        least, worst = (f(flown, key=lambda one: one.metrics["range_error_peak_m"] or 0.0) for f in (min, max))
         said.append(
-            f"The circle is infeasible at {case.max_heading_rate_deg_s:g} deg/s in this wind; every plant leaves it, "
-            f"by "
-            f"{_of(least, 'range_error_peak_m', 'm')} ({least.plant}, {least.law}) to "
-            f"{_of(worst, 'range_error_peak_m', 'm')} ({worst.plant}, {worst.law}) in the last half."
+            f"Infeasible: holding the circle takes more than {case.max_heading_rate_deg_s:g} deg/s in this wind, and "
+            f"every plant leaves it, by {number(least.metrics['range_error_peak_m'])} m ({least.law}, {least.plant}) to "
+            f"{number(worst.metrics['range_error_peak_m'])} m ({worst.law}, {worst.plant})."
         )
-    for law in LAWS:
-        kinematic, *others = [f for f in flown if f.law == law]
-        said += [_difference(law, kinematic, other) for other in others]
-    return said
+    return said + [_law_across_plants([one for one in flown if one.law == law]) for law in LAWS]
 
 
-def _difference(law: str, kinematic: Flown, other: Flown) -> str:
-    parts = [
-        _settling(kinematic, other),
-        f"range error {_versus(kinematic, other, 'range_error_rms_m', 'm rms')}",
-        f"saturated {_percent(kinematic)} -> {_percent(other)} of the last half",
-        f"command activity {_versus(kinematic, other, 'command_activity_deg_s2', 'deg/s2')}",
-        f"sideslip up to {_of(other, 'sideslip_peak_deg', 'deg')} where the model has none",
-    ]
-    return f"{law}, kinematic -> {other.plant}: " + "; ".join(parts) + "."
+def _law_across_plants(flown: list[Flown]) -> str:
+    """`flown` is one law's flights, the kinematic one first."""
+    kinematic, *others = flown
+    before = kinematic.metrics["convergence_time_s"]
+    settling = [f"{_settles(before)} on the kinematic aircraft"]
+    for one in others:
+        after = one.metrics["convergence_time_s"]
+        later = f" ({after - before:+.1f} s)" if after is not None and before is not None else ""
+        settling.append(f"{_settles(after)}{later} on {one.plant}")
+    activity = [one.metrics["command_activity_deg_s2"] or 0.0 for one in flown]
+    chatters = min(activity[1:]) > CHATTER * max(activity[0], 0.1)
+    return (
+        f"{kinematic.law} settles: {', '.join(settling)}. In the last half its command is at the limit "
+        f"{_each(flown, 'saturation_fraction', 100.0)} % of the time and moves by "
+        f"{_each(flown, 'command_activity_deg_s2')} deg/s2"
+        f"{': behind an inner loop it chatters' if chatters else ''}; the range error is "
+        f"{_each(flown, 'range_error_rms_m')} m rms. "
+        f"Sideslip, which the kinematic aircraft has not, reaches {_each(others, 'sideslip_peak_deg')} deg."
+    )
 
 
-def _settling(kinematic: Flown, other: Flown) -> str:
-    before, after = kinematic.metrics["convergence_time_s"], other.metrics["convergence_time_s"]
-    if before is None or after is None:
-        return f"settles {_time(before)} -> {_time(after)}"
-    return f"settles {_time(before)} -> {_time(after)} ({after - before:+.1f} s)"
+CHATTER = 10.0  # times the kinematic activity, itself taken as 0.1 deg/s2 at least
 
 
-def _time(value: float | None) -> str:
-    return "never" if value is None else f"in {value:.1f} s"
+def _settles(time: float | None) -> str:
+    return "never" if time is None else f"in {time:.1f} s"
 
 
-def _versus(kinematic: Flown, other: Flown, metric: str, unit: str) -> str:
-    return f"{number(kinematic.metrics[metric])} -> {number(other.metrics[metric])} {unit}"
+def _each(flown: list[Flown], metric: str, scale: float = 1.0) -> str:
+    return " / ".join(number(_scaled(one.metrics[metric], scale)) for one in flown)
 
 
-def _of(one: Flown, metric: str, unit: str) -> str:
-    return f"{number(one.metrics[metric])} {unit}"
-
-
-def _percent(one: Flown) -> str:
-    return f"{100.0 * (one.metrics['saturation_fraction'] or 0.0):.0f} %"
+def _scaled(value: float | None, scale: float) -> float | None:
+    return None if value is None else value * scale

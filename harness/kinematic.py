@@ -8,7 +8,7 @@ from harness.plant import Flying, Start
 from harness.state import State
 from harness.wind import Wind
 
-_NO_AIRFRAME = State(*(math.nan,) * len(State._fields))[9:-3]  # from bank to throttle
+_NO_AIRFRAME = (math.nan,) * (State._fields.index("throttle") - State._fields.index("velocity_down"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class _KinematicFlying:
         W_x, W_y = self._wind
         return State._make(
             (
-                x, y, self._altitude, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, 0.0, v_a, psi, heading_rate,
-                *_NO_AIRFRAME, W_x, W_y, 0.0,
+                x, y, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, v_a, psi, heading_rate, math.nan, math.nan,
+                self._altitude, 0.0, *_NO_AIRFRAME, W_x, W_y, 0.0,
             )
         )  # fmt: skip

@@ -13,6 +13,10 @@ from harness.state import State
 from harness.target import TargetState
 
 
+_OWN = Observation._fields.index("nominal_airspeed")  # the first fields of both are the same
+assert State._fields[:_OWN] == Observation._fields[:_OWN]
+
+
 def simulate(flight: Flight) -> FlightLog:
     """Flies the flight: once started it always ends in a log. ValueError, or `PlantError`, when it cannot."""
     for problem in problems(flight):
@@ -42,10 +46,7 @@ def simulate(flight: Flight) -> FlightLog:
 
 def observe(state: State, nominal_airspeed: float, wind: tuple[float, float], seen: TargetState) -> Observation:
     """What the law gets to know: the aircraft's own state, the steady wind, the target as `seen`."""
-    x, y, _, v_x, v_y, _, airspeed, heading, heading_rate, bank, _, _, roll_rate = state[:13]
-    return Observation._make(
-        (x, y, v_x, v_y, airspeed, nominal_airspeed, heading, heading_rate, bank, roll_rate, *wind, *seen)
-    )
+    return Observation._make((*state[:_OWN], nominal_airspeed, *wind, *seen))
 
 
 def command(law: Step, observation: Observation) -> Guidance:

@@ -119,19 +119,39 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
     run before engagement, so no lag falsifies the result. Raises `NoTrimError` where there is none.
     """
     _place(fdm, start, wind)
-    x = np.array([0.05, 0.0, 0.5])
+    x = Trim(pitch=0.05, elevator=0.0, throttle=0.5)
     for _ in range(30):
         residual = _accelerations(fdm, x)
-        if np.abs(residual).max() < 1e-11:
+        if max(map(abs, residual)) < 1e-11:
             break
-        slopes = np.array([(_accelerations(fdm, x + h) - residual) / 1e-5 for h in 1e-5 * np.eye(3)]).T
-        change = np.linalg.lstsq(slopes, -residual)[0]
-        x = x + change * min(1.0, 0.1 / max(np.abs(change).max(), 1e-9))
-    residual = _accelerations(fdm, x)
-    found = Trim(*x.tolist())
-    if not (np.abs(residual).max() < 1e-8 and 0.0 < found.throttle < 1.0 and abs(found.pitch) < math.pi / 6):
+        slopes = []
+        for i in range(3):
+            nudged = _accelerations(fdm, Trim._make(v + 1e-5 * (i == j) for j, v in enumerate(x)))
+            slopes.append(tuple((there - here) / 1e-5 for there, here in zip(nudged, residual, strict=True)))
+        change = _solve(*slopes, residual)
+        share = min(1.0, 0.1 / max(1e-9, *map(abs, change)))  # at most 0.1 rad, 0.1 of the throttle at a time
+        x = Trim._make(v - share * d for v, d in zip(x, change, strict=True))
+    found = max(map(abs, _accelerations(fdm, x))) < 1e-8
+    if not (found and 0.0 < x.throttle < 1.0 and abs(x.pitch) < math.pi / 6):
         raise NoTrimError(f"no level trim at {start.airspeed:g} m/s")
-    return found
+    return x
+
+
+Vector = tuple[float, float, float]
+
+
+def _solve(a: Vector, b: Vector, c: Vector, r: Vector) -> Vector:
+    """x of [a b c] x = r by Cramer's rule: the same bits on every machine, which a linear algebra library's are not."""
+    det = _dot(a, _cross(b, c)) or math.nan
+    return _dot(r, _cross(b, c)) / det, _dot(a, _cross(r, c)) / det, _dot(a, _cross(b, r)) / det
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> None:
@@ -157,18 +177,16 @@ def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> None:
     write(fdm, "inner-loop/engaged", 0.0)
 
 
-def _accelerations(fdm: jsbsim.FGFDMExec, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(u', w', q') in m/s^2, m/s^2, rad/s^2 at pitch, elevator, throttle `x`."""
-    fdm["ic/theta-rad"] = x[0]
-    fdm["fcs/elevator-pos-rad"] = x[1]
-    fdm["actuators/throttle-norm"] = x[2]
+def _accelerations(fdm: jsbsim.FGFDMExec, x: Trim) -> Vector:
+    """(u', w', q') in m/s^2, m/s^2, rad/s^2 at this pitch, elevator and throttle."""
+    fdm["ic/theta-rad"] = x.pitch
+    fdm["fcs/elevator-pos-rad"] = x.elevator
+    fdm["actuators/throttle-norm"] = x.throttle
     fdm.run_ic()
-    return np.array(
-        [
-            FT * fdm["accelerations/udot-ft_sec2"],
-            FT * fdm["accelerations/wdot-ft_sec2"],
-            fdm["accelerations/qdot-rad_sec2"],
-        ]
+    return (
+        FT * fdm["accelerations/udot-ft_sec2"],
+        FT * fdm["accelerations/wdot-ft_sec2"],
+        fdm["accelerations/qdot-rad_sec2"],
     )
 
 
@@ -189,15 +207,15 @@ def engage(fdm: jsbsim.FGFDMExec, trimmed: Trim, start: Start, rate_trim: bool) 
 _READ = (
     "position/from-start-neu-n-ft",
     "position/from-start-neu-e-ft",
-    "position/h-sl-ft",
     "velocities/v-north-fps",
     "velocities/v-east-fps",
-    "velocities/v-down-fps",
     "velocities/vt-fps",
     "attitude/phi-rad",
+    "velocities/p-rad_sec",
+    "position/h-sl-ft",
+    "velocities/v-down-fps",
     "attitude/theta-rad",
     "attitude/psi-rad",
-    "velocities/p-rad_sec",
     "velocities/q-rad_sec",
     "velocities/r-rad_sec",
     "inner-loop/bank-command-rad",
@@ -240,7 +258,7 @@ class _SixDofFlying:
     def __init__(self, fdm: jsbsim.FGFDMExec, step: float, start: Start, wind: Wind, stall: float) -> None:
         self._run: Callable[[], bool] = fdm.run
         self._readers = [_node(fdm, name).get_double_value for name in _READ]
-        self._velocity_north, self._velocity_east = self._readers[3:5]
+        self._velocity_north, self._velocity_east = self._readers[2:4]
         self._command = _node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
         self._step = step
         self._north, self._east = start.position
@@ -279,16 +297,16 @@ class _SixDofFlying:
 
     def _read(self, before: float) -> State:
         """The state now; `before` is the heading one step ago, which gives its rate (over that step)."""
-        n, e, h, v_n, v_e, v_d, V, *attitude_and_rates, phi_c, alpha, beta, N_y, N_z, d_a, d_e, d_r, d_t = [
+        n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z, *surfaces = [
             get() for get in self._readers
         ]
         W_x, W_y = self._wind
         heading = math.atan2(FT * v_e - W_y, FT * v_n - W_x)
         return State._make(
             (
-                self._north + FT * n, self._east + FT * e, FT * h, FT * v_n, FT * v_e, FT * v_d, FT * V,
-                heading, wrap(heading - before) / self._step, *attitude_and_rates, phi_c, alpha, beta,
-                GRAVITY * N_y, N_z, d_a, d_e, d_r, d_t, W_x, W_y, 0.0,
+                self._north + FT * n, self._east + FT * e, FT * v_n, FT * v_e, FT * V,
+                heading, wrap(heading - before) / self._step, phi, p, FT * h, FT * v_d, theta, psi, q, r,
+                phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, W_x, W_y, 0.0,
             )
         )  # fmt: skip
 

@@ -15,17 +15,17 @@ class State(NamedTuple):
 
     north: float
     east: float
-    altitude: float
     velocity_north: float  # over the ground
     velocity_east: float
-    velocity_down: float
     airspeed: float
     heading: float
     heading_rate: float
-    bank: float = NAN
+    bank: float  # the fields so far, and the next, are what a law may know of its own aircraft
+    roll_rate: float
+    altitude: float
+    velocity_down: float
     pitch: float = NAN
     yaw: float = NAN
-    roll_rate: float = NAN
     pitch_rate: float = NAN
     yaw_rate: float = NAN  # about the body's z axis
     bank_command: float = NAN

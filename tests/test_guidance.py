@@ -135,7 +135,7 @@ def test_every_answer_is_finite_for_every_finite_observation(
 ) -> None:
     name, gains = which
     steering = law(name, gains, airspeed=airspeed, command=command)
-    o = Observation(x[0], x[1], x[2], x[3], abs(x[4]), 13.0, x[5], x[6], x[7], x[8], x[9], x[10], *x[11:16], x[0])
+    o = Observation(x[0], x[1], x[2], x[3], abs(x[4]), x[5], x[6], x[7], x[8], 13.0, x[9], x[10], *x[11:16], x[0])
     if at_the_target:
         o = o._replace(target_north=o.north, target_east=o.east)
     answer = fly_at(o, steering)
