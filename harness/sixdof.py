@@ -104,6 +104,10 @@ def _node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
     return node
 
 
+Vector = tuple[float, float, float]
+_NUDGE = 1e-5  # rad, or of the throttle
+
+
 class Trim(NamedTuple):
     """Steady level flight: rad, rad, 0-1."""
 
@@ -124,11 +128,8 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
         residual = _accelerations(fdm, x)
         if max(map(abs, residual)) < 1e-11:
             break
-        slopes = []
-        for i in range(3):
-            nudged = _accelerations(fdm, Trim._make(v + 1e-5 * (i == j) for j, v in enumerate(x)))
-            slopes.append(tuple((there - here) / 1e-5 for there, here in zip(nudged, residual, strict=True)))
-        change = _solve(*slopes, residual)
+        by_pitch, by_elevator, by_throttle = (_slope(fdm, x, i, residual) for i in range(3))
+        change = _solve(by_pitch, by_elevator, by_throttle, residual)
         share = min(1.0, 0.1 / max(1e-9, *map(abs, change)))  # at most 0.1 rad, 0.1 of the throttle at a time
         x = Trim._make(v - share * d for v, d in zip(x, change, strict=True))
     found = max(map(abs, _accelerations(fdm, x))) < 1e-8
@@ -137,7 +138,10 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
     return x
 
 
-Vector = tuple[float, float, float]
+def _slope(fdm: jsbsim.FGFDMExec, x: Trim, i: int, residual: Vector) -> Vector:
+    """The change of the accelerations per unit of the i-th unknown."""
+    u, w, q = _accelerations(fdm, Trim._make(v + _NUDGE * (i == j) for j, v in enumerate(x)))
+    return (u - residual[0]) / _NUDGE, (w - residual[1]) / _NUDGE, (q - residual[2]) / _NUDGE
 
 
 def _solve(a: Vector, b: Vector, c: Vector, r: Vector) -> Vector:
