@@ -31,6 +31,7 @@ _COLOURS = ((125, 165, 215), (255, 150, 40), (100, 215, 110), (230, 110, 230), (
 _TARGET_COLOUR = (235, 75, 85)
 _WIND_COLOUR = (220, 220, 220)
 _GREY = (125, 125, 125)
+_WIDE, _THIN = 3.5, 1.5  # lines, in points on the screen
 _MOST_WITH_COMMANDS = 2  # flights; of more, the commands would hide what was flown
 _MOST_WITH_LEGENDS = 3  # flights; of more, one legend for all plots: a flight has one colour everywhere
 _ELEVATION = math.radians(55.0)  # of the eye above the scene
@@ -122,7 +123,7 @@ def _encode(logs: Logs, title: str, notes: str) -> bytes:
     recording.set_log_time_enabled(False)
     _send_layout(recording, _layout(logs, plots))
     recording.send_recording_name(title)
-    _log(recording, "/notes", rr.TextDocument(f"## {title}\n\n{notes}", media_type=rr.MediaType.MARKDOWN))
+    _log(recording, "/notes", rr.TextDocument(f"### {title}\n\n{notes}", media_type=rr.MediaType.MARKDOWN))
     _log_surroundings(recording, next(iter(logs.values())))
     for i, (name, log) in enumerate(logs.items()):
         _log_flight(recording, name, log, *_style(i, logs))
@@ -160,7 +161,8 @@ def _log_flight(recording: rr.RecordingStream, name: str, log: FlightLog, colour
     _log(recording, f"{entity}/log", rr.SeriesLines(names=COLUMNS))
     rows = rr.Scalars.columns(scalars=log.table.ravel()).partition([len(COLUMNS)] * len(log))
     _send(recording, f"{entity}/log", time, rows)  # as vectors: a third of the room that an entity per column takes
-    _log(recording, f"{entity}/track", _lines([track], colour, 0.5 * width))
+    below = (0.0, 0.0, 0.5 * (width - _THIN))  # m: a thin track that lies on a wide one stays visible
+    _log(recording, f"{entity}/track", _lines([track + below], colour, 0.5 * width))
     _log(recording, f"{entity}/aircraft", _airframe(log.flight.law.standoff / 4.0, colour))
     pose = rr.Transform3D.columns(translation=track, quaternion=_attitude(log))
     _send(recording, f"{entity}/aircraft", time, pose)
@@ -185,8 +187,8 @@ def _log_surroundings(recording: rr.RecordingStream, log: FlightLog) -> None:
     _log(recording, "/target/track", _lines([ground], _TARGET_COLOUR, 1.0))
     _send(recording, "/target/position", log["time"], rr.Transform3D.columns(translation=ground))
     _log(recording, "/target/position/point", _label([foot], _TARGET_COLOUR, 5.0, "target"))
-    circle = [_circle(log, 121) + centre, np.array((foot, centre))]
-    _log(recording, "/target/position/circle", _lines(circle, _TARGET_COLOUR, 0.7))
+    circle = _circle(log, 121) + centre + (0.0, 0.0, 2.0)  # m, below the tracks: one that lies on it stays visible
+    _log(recording, "/target/position/circle", _lines([circle, np.array((foot, centre))], _TARGET_COLOUR, 0.7))
     if wind.any():
         arrow = rr.Arrows3D(vectors=[20.0 * wind], origins=[centre], colors=_WIND_COLOUR, radii=-2.5)
         _log(recording, "/target/position/wind", arrow)
@@ -235,7 +237,7 @@ def _circle(log: FlightLog, corners: int) -> Array:
 
 def _style(i: int, logs: Logs) -> tuple[Colour, float]:
     """Colour and line width of the i-th flight; alone, the reference need not be wide."""
-    return _COLOURS[i % len(_COLOURS)], 3.5 if i == 0 and len(logs) > 1 else 1.5
+    return _COLOURS[i % len(_COLOURS)], _WIDE if i == 0 and len(logs) > 1 else _THIN
 
 
 def _curves(plot: _Plot, logs: Logs) -> list[_Curve]:
@@ -287,7 +289,7 @@ def _layout(logs: Logs, plots: Mapping[_Plot, list[_Curve]]) -> rrb.Blueprint:
                 origin=f"/plots/{plot.flown}",
                 name=f"{plot.flown.replace('_', ' ').capitalize()} [{plot.unit}]",
                 axis_x=time,
-                axis_y=_axis(plot, logs),
+                axis_y=_axis(plot, curves, logs),
                 plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=visible),
             )
         )
@@ -301,18 +303,22 @@ def _layout(logs: Logs, plots: Mapping[_Plot, list[_Curve]]) -> rrb.Blueprint:
     )
 
 
-def _axis(plot: _Plot, logs: Logs) -> rrb.ScalarAxis | None:
-    """Room for the limit; of the range error what settles, and all of the last half. The rest fits itself."""
+def _axis(plot: _Plot, curves: list[_Curve], logs: Logs) -> rrb.ScalarAxis:
+    """Room for the limit; all of a curve, but of the range error before half-time what is near."""
     if plot is _HEADING_RATE:
-        most = 1.3 * _DEG * max(log.flight.law.max_heading_rate for log in logs.values())
-        return rrb.ScalarAxis(range=(-most, most))
+        high = 1.3 * _DEG * max(log.flight.law.max_heading_rate for log in logs.values())
+        return rrb.ScalarAxis(range=(-high, high))
+    seen = [curve.values for curve in curves]
     if plot is _RANGE_ERROR:
         near = max(0.5 * log.flight.law.standoff for log in logs.values())
-        errors = [log["range_error"] for log in logs.values()]
-        seen = np.concatenate([*(r.clip(-near, near) for r in errors), *(r[len(r) // 2 :] for r in errors)])
-        low, high = seen.min(initial=-0.1 * near), seen.max(initial=0.1 * near)
-        return rrb.ScalarAxis(range=(1.08 * low - 0.08 * high, 1.08 * high - 0.08 * low))
-    return None
+        seen = [np.append(values.clip(-near, near), values[len(values) // 2 :]) for values in seen]
+    everything = np.concatenate([(-0.1, 0.1), *seen])
+    low, high = np.nanmin(everything), np.nanmax(everything)
+    step = 10.0 ** math.floor(math.log10(max(-low, high)))
+    if high - low > 7.0 * step:  # too many for Rerun to label each: the next power of ten gets a label
+        low, high = (low, max(high, 10.0 * step)) if high > -low else (min(low, -10.0 * step), high)
+    margin = 0.08 * (high - low)
+    return rrb.ScalarAxis(range=(low - margin, high + margin))
 
 
 def _scene(logs: Logs) -> rrb.Spatial3DView:
