@@ -119,8 +119,8 @@ def differences(flown: list[Flown]) -> list[str]:
     if feasibility_margin(flown[0].log.flight) < 0:
         least, worst = (f(flown, key=lambda one: one.metrics["range_error_peak_m"] or 0.0) for f in (min, max))
         said.append(
-            f"Infeasible: holding the circle takes more than {case.max_heading_rate_deg_s:g} deg/s in this wind, and "
-            f"every plant leaves it, by {number(least.metrics['range_error_peak_m'])} m ({least.law}, {least.plant}) to "
+            f"Infeasible: holding the circle takes more than {case.max_heading_rate_deg_s:g} deg/s in this wind, "
+            f"and every plant leaves it, by {number(least.metrics['range_error_peak_m'])} m ({least.law}, {least.plant}) to "
             f"{number(worst.metrics['range_error_peak_m'])} m ({worst.law}, {worst.plant})."
         )
     return said + [_law_across_plants([one for one in flown if one.law == law]) for law in LAWS]

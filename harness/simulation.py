@@ -12,7 +12,6 @@ from harness.plant import End, Outcome
 from harness.state import State
 from harness.target import TargetState
 
-
 _OWN = Observation._fields.index("nominal_airspeed")  # the first fields of both are the same
 assert State._fields[:_OWN] == Observation._fields[:_OWN]
 

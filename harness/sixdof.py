@@ -145,7 +145,7 @@ def _slope(fdm: jsbsim.FGFDMExec, x: Trim, i: int, residual: Vector) -> Vector:
 
 
 def _solve(a: Vector, b: Vector, c: Vector, r: Vector) -> Vector:
-    """x of [a b c] x = r by Cramer's rule: the same bits on every machine, which a linear algebra library's are not."""
+    """Solves [a b c] x = r by Cramer's rule: the same bits everywhere, which a linear algebra library's are not."""
     det = _dot(a, _cross(b, c)) or math.nan
     return _dot(r, _cross(b, c)) / det, _dot(a, _cross(r, c)) / det, _dot(a, _cross(b, r)) / det
 
