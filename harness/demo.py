@@ -118,10 +118,10 @@ def differences(flown: list[Flown]) -> list[str]:
     said = []
     if feasibility_margin(flown[0].log.flight) < 0:
         least, worst = (f(flown, key=lambda one: one.metrics["range_error_peak_m"] or 0.0) for f in (min, max))
+        left = [f"{number(f.metrics['range_error_peak_m'])} m ({f.law}, {f.plant})" for f in (least, worst)]
         said.append(
             f"Infeasible: holding the circle takes more than {case.max_heading_rate_deg_s:g} deg/s in this wind, "
-            f"and every plant leaves it, by {number(least.metrics['range_error_peak_m'])} m ({least.law}, {least.plant}) to "
-            f"{number(worst.metrics['range_error_peak_m'])} m ({worst.law}, {worst.plant})."
+            f"and every plant leaves it, by {left[0]} to {left[1]}."
         )
     return said + [_law_across_plants([one for one in flown if one.law == law]) for law in LAWS]
 
