@@ -1,13 +1,12 @@
 """The paper's law: nonsingular fast terminal sliding mode guidance, Eq. (15)-(20)."""
 
 from dataclasses import dataclass
-from math import asin, atan, pi
+from math import asin, atan, copysign, pi
 from types import MappingProxyType
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Lt
 
-from autopilot.angles import sig
 from autopilot.guidance import Step
 from autopilot.quantities import About
 from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
@@ -20,7 +19,7 @@ GAIN_SETS = MappingProxyType(
     }
 )
 
-_SMALLEST_ELL = 1e-12  # |ell|^(beta2-1) is singular at 0 when beta2 < 1, as in the paper's own set
+_SMALLEST = 1e-12  # stands for |ell| = 0, where |ell|^(beta2-1) is singular for beta2 < 1, as in the paper's own set
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,31 +59,27 @@ class Nftsm(StandoffLaw):
         return broken
 
 
-def sigma(x: float, beta3: float, eta: float) -> tuple[float, float]:
-    """The smoothed terminal term of Definition 5, and its slope: r1 + 2 r2 |x| inside, where Eq. (16) prints x."""
-    size = abs(x)
-    if size > eta:
-        power = size ** (beta3 - 1.0)
-        return power * x, beta3 * power
-    r2 = (beta3 - 1.0) * eta ** (beta3 - 2.0)
-    r1 = (2.0 - beta3) * eta ** (beta3 - 1.0)
-    return (r1 + r2 * size) * x, r1 + 2.0 * r2 * size
-
-
 def reaching(g: Nftsm) -> Reaching:
-    """Eq. (17)-(19) with these gains, unlimited: (feed-forward, rest of the command, s) in rad/s, rad/s, rad."""
+    """Eq. (15)-(19) with these gains, unlimited: (feed-forward, rest of the command, s) in rad/s, rad/s, rad."""
     alpha2, alpha3, beta2, beta3, eta = g.alpha2, g.alpha3, g.beta2, g.beta3, g.eta
     k1, k2, k3, gamma1 = g.k1, g.k2, g.k3, g.gamma1
+    r1 = (2.0 - beta3) * eta ** (beta3 - 1.0)
+    r2 = (beta3 - 1.0) * eta ** (beta3 - 2.0)
 
     def reach(motion: Motion) -> tuple[float, float, float]:
         r, r_dot, lam_dot, psi_a_err, psi_a_d_dot = motion
         k1_r = k1 * r
         ell = atan(k1_r)
-        sigma_ell, sigma_slope = sigma(ell, beta3, eta)
-        fast = alpha2 * max(abs(ell), _SMALLEST_ELL) ** (beta2 - 1.0)  # alpha2 sig^beta2(ell) = fast ell
-        slope = beta2 * fast + alpha3 * sigma_slope  # Eq. (16)
-        s = psi_a_err + fast * ell + alpha3 * sigma_ell  # Eq. (17)
-        rest = -slope * k1 * r_dot / (1.0 + k1_r * k1_r) - k2 * s - k3 * sig(s, gamma1)  # Eq. (19)
-        return lam_dot + psi_a_d_dot, rest, s
+        size = abs(ell) or _SMALLEST
+        fast = alpha2 * size ** (beta2 - 1.0)  # alpha2 sig^beta2(ell) = fast ell
+        if size > eta:
+            power = alpha3 * size ** (beta3 - 1.0)
+            f, slope = (fast + power) * ell, beta2 * fast + beta3 * power
+        else:  # Definition 5; its slope has r1 + 2 r2 |ell| where Eq. (16) prints ell
+            f = (fast + alpha3 * (r1 + r2 * size)) * ell
+            slope = beta2 * fast + alpha3 * (r1 + 2.0 * r2 * size)
+        s = psi_a_err + f  # Eq. (17)
+        reached = k2 * s + k3 * copysign(abs(s) ** gamma1, s)  # Eq. (18)
+        return lam_dot + psi_a_d_dot, -slope * k1 * r_dot / (1.0 + k1_r * k1_r) - reached, s  # Eq. (19)
 
     return reach

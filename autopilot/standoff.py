@@ -49,7 +49,8 @@ def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Mot
     else:  # Remark 1 is broken: no heading keeps the distance; the nearest one is held
         bar_psi_a_d = copysign(0.5 * pi, across)
         psi_a_d_dot = 0.0
-    return L - R_d, r_dot, lam_dot, wrap(bar_psi_a - bar_psi_a_d), psi_a_d_dot
+    psi_a_err = bar_psi_a - bar_psi_a_d
+    return L - R_d, r_dot, lam_dot, psi_a_err if -pi <= psi_a_err < pi else wrap(psi_a_err), psi_a_d_dot
 
 
 def course_rate_ratio(v_a: float, psi_a: float, W_x: float, W_y: float) -> float:
