@@ -3,16 +3,19 @@
 import math
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 import aircraft
+from autopilot.estimator import Estimator
 from autopilot.guidance import Law
 from autopilot.quantities import About, Metres, Seconds
 from harness.kinematic import Kinematic
 from harness.plant import Plant, Start
-from harness.target import Target
+from harness.target import Target, TargetState
+from harness.track import TrackError, load_track
 from harness.wind import Wind
 
 
@@ -21,13 +24,6 @@ class InnerLoop:
     """Settings of the 6-DOF plant's inner loop."""
 
     rate_trim: Annotated[bool, About("slow integrator that removes the turn-rate shortfall of a bank-only turn")] = True
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimator:
-    """What the law knows of the target."""
-
-    kind: Annotated[Literal["truth"], About("truth: the target's own state")] = "truth"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,19 +86,19 @@ def problems(flight: Flight) -> list[Problem]:
         if not _is_multiple(period, unit):
             found.append(Problem(name, f"{period:g} s is no whole multiple of {unit_name}, {unit:g} s"))
             break
+    sample, guidance = flight.estimator.period, flight.guidance_period
+    if flight.estimator.kind == "ekf":
+        if not _is_multiple(sample, flight.step):
+            found.append(Problem("estimator.period", f"{sample:g} s is no whole multiple of step_s, {flight.step:g} s"))
+        elif not (_is_multiple(sample, guidance) or _is_multiple(guidance, sample)):
+            neither = f"{sample:g} s is neither a whole multiple nor a whole part of guidance_period_s, {guidance:g} s"
+            found.append(Problem("estimator.period", neither))
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:
         found.append(
             Problem("wind.steady", f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s")
         )
-    for i, segment in enumerate(flight.target.segments):
-        if segment.to <= segment.from_:
-            found.append(
-                Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
-            )
-    slowest = min(leg.speed for leg in flight.target.legs())
-    if slowest < -1e-9:
-        found.append(Problem("target.segments", f"slow the target down to {slowest:g} m/s, must stay at or above 0"))
+    found += _target_problems(flight)
     try:
         aircraft.folder(flight.aircraft)
     except OSError:
@@ -113,17 +109,49 @@ def problems(flight: Flight) -> list[Problem]:
     return found
 
 
+def _target_problems(flight: Flight) -> list[Problem]:
+    target = flight.target
+    if target.track is not None:
+        default = Target()
+        found = [
+            Problem(f"target.{name}", "is set beside a track, which alone says where the target is: leave it out")
+            for name in ("position", "speed", "heading", "segments")
+            if getattr(target, name) != getattr(default, name)
+        ]
+        try:
+            end = load_track(Path(target.track)).end
+        except TrackError as error:
+            return [*found, Problem("target.track", str(error))]
+        if flight.duration > end * (1.0 + 1e-9):
+            ends = f"{target.track} ends at {end:g} s, must last as long as duration_s, {flight.duration:g} s"
+            found.append(Problem("target.track", ends))
+        return found
+    found = [
+        Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
+        for i, segment in enumerate(target.segments)
+        if segment.to <= segment.from_
+    ]
+    slowest = min(leg.speed for leg in target.legs())
+    if slowest < -1e-9:
+        found.append(Problem("target.segments", f"slow the target down to {slowest:g} m/s, must stay at or above 0"))
+    return found
+
+
 def _is_multiple(period: float, unit: float) -> bool:
     return round(period / unit) >= 1 and math.isclose(round(period / unit) * unit, period, rel_tol=1e-9)
+
+
+def _target_states(flight: Flight) -> list[TargetState]:
+    """The target during the flight, at its breakpoints and twice a second."""
+    at = flight.target.start()
+    times = {*flight.target.breakpoints(), *(0.5 * k for k in range(int(2 * flight.duration) + 1))}
+    return [at(t) for t in times if 0.0 <= t <= flight.duration]
 
 
 def relative_speed(flight: Flight) -> float:
     """The largest |wind - target velocity| of the flight, m/s, at the target's breakpoints and twice a second."""
     W_x, W_y = flight.wind.steady
-    at = flight.target.start()
-    times = {leg.begin for leg in flight.target.legs()} | {0.5 * k for k in range(int(2 * flight.duration) + 1)}
-    seen = [at(t) for t in times if t <= flight.duration]
-    return max(math.hypot(W_x - s.target_velocity_north, W_y - s.target_velocity_east) for s in seen)
+    return max(math.hypot(W_x - s.target_velocity_north, W_y - s.target_velocity_east) for s in _target_states(flight))
 
 
 def needed_heading_rate(flight: Flight) -> float:
@@ -141,13 +169,17 @@ def warnings(flight: Flight) -> list[str]:
     """What the user should know before trusting the flight; it is flown all the same."""
     said = []
     v_a = flight.start.airspeed
-    fastest = max(abs(leg.speed) for leg in flight.target.legs())
+    fastest = max(math.hypot(s.target_velocity_north, s.target_velocity_east) for s in _target_states(flight))
     ratio = (fastest + math.hypot(*flight.wind.steady)) / v_a
     if ratio >= 1.0:
         said.append(f"Remark 1 asks for v_t + v_w < v_a; here it is {ratio * v_a:.3g} m/s of {v_a:g} m/s")
     if feasibility_margin(flight) < 0:
         said.append("the circle is infeasible: the heading-rate limit is below what holding it takes")
     if flight.plant == "sixdof":
+        envelope = aircraft.data(aircraft.folder(flight.aircraft))["envelope"]
+        v_min, v_max = envelope["V_min"]["v"], envelope["V_max"]["v"]
+        if not v_min <= v_a <= v_max:
+            said.append(f"{v_a:g} m/s is outside the airframe's envelope, {v_min:g} to {v_max:g} m/s")
         needed = math.atan(v_a * flight.law.max_heading_rate / 9.80665)
         limit = aircraft.bank_limit(aircraft.folder(flight.aircraft))
         if needed > limit:

@@ -6,14 +6,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.estimator import Estimate, Measurement
 from autopilot.guidance import Guidance
 from harness.flight import Flight
 from harness.plant import Outcome
 from harness.state import State
 from harness.target import TargetState
 
-GUIDANCE_COLUMNS = ("heading_rate_command", *Guidance._fields[1:])
-COLUMNS = ("time", *State._fields, *TargetState._fields, *GUIDANCE_COLUMNS)
+# The loop writes the first columns, row by row; the rest follows from the flight as a whole.
+GUIDANCE_COLUMNS = ("heading_rate_command", "range_error_seen", *Guidance._fields[2:])  # from what the law knew
+LOOP_COLUMNS = ("time", *State._fields, *TargetState._fields, *GUIDANCE_COLUMNS)
+# The target as the law knew it: the truth itself, with variances of NaN, where nothing is estimated. An innovation is
+# NaN but in the rows with a new measurement; of several since the row before, it is the latest's.
+SEEN_COLUMNS = (
+    *(f"{name}_seen" for name in Estimate._fields[:4]),
+    *Estimate._fields[4:],
+    *(f"innovation_{name}" for name in Measurement._fields),
+)
+COLUMNS = (*LOOP_COLUMNS, "range_error", *SEEN_COLUMNS)  # the range error is the true one
 
 
 @dataclass(frozen=True, slots=True)

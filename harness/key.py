@@ -17,11 +17,15 @@ PHYSICS = 1  # of the plants, the wind and the loop: raised whenever a change th
 
 def flight_key(flight: Flight) -> str:
     """32 hex digits, equal exactly when the same flight would be flown."""
+    settings = document(flight)
+    if flight.target.track is not None:
+        settings["target"]["track"] = "content"  # counts, not where it lies
     decides = {
-        "settings": document(flight),
+        "settings": settings,
         "physics": PHYSICS,
         "content": {name: _digest(path, path.stat().st_mtime_ns) for name, path in _files(flight)},
         "jsbsim": version("jsbsim") if flight.plant == "sixdof" else None,
+        "filterpy": version("filterpy") if flight.estimator.kind == "ekf" else None,
     }
     canonical = json.dumps(decides, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
@@ -31,6 +35,8 @@ def _files(flight: Flight) -> Iterator[tuple[str, Path]]:
     on_board = Path(autopilot.__file__).parent
     for path in sorted(on_board.glob("*.py")):
         yield f"autopilot/{path.name}", path
+    if flight.target.track is not None:
+        yield "target/track", Path(flight.target.track)
     if flight.plant == "sixdof":
         yield "autopilot/inner_loop.xml", on_board / "inner_loop.xml"
         yield "harness/planet.xml", Path(__file__).parent / "planet.xml"

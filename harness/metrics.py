@@ -40,7 +40,9 @@ GRAVITY = 9.80665
 
 
 def metrics(log: FlightLog) -> dict[str, float | None]:
-    """All metrics of a flight, by the names of `MEANING`. Units by suffix."""
+    """All metrics of a flight, by the names of `MEANING`. Units by suffix. None of them when it has no row."""
+    if not len(log):
+        return dict.fromkeys(MEANING)
     period = log.flight.guidance_period
     time, error, command = log["time"], log["range_error"], log["heading_rate_command"]
     half = len(log) // 2

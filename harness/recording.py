@@ -324,7 +324,7 @@ def _axis(plot: _Plot, curves: list[_Curve], logs: Logs) -> rrb.ScalarAxis:
 def _scene(logs: Logs) -> rrb.Spatial3DView:
     """Seen from the south and from above, just far enough to see everything."""
     reference = next(iter(logs.values()))
-    ground = np.vstack([(*reference.flight.target.position, 0.0), _ground(reference)[::-20]])
+    ground = _ground(reference)[::-20] if len(reference) else np.zeros((1, 3))
     centres = ground - (0.0, 0.0, reference.flight.start.altitude)
     rims = (centres[:, np.newaxis] + _circle(reference, 25)).reshape(-1, 3)
     c, s = math.cos(_ELEVATION), math.sin(_ELEVATION)

@@ -71,7 +71,7 @@ class SettingsFile:
         matrix = self.document.get("matrix")
         if matrix and isinstance(matrix, dict):
             raise SettingsError([f"{self._place(('matrix',)).text}: matrix: many flights, not one: use `harness run`"])
-        return _flight(self.document, self._place)
+        return _flight(self.document, self._place, self.path.parent)
 
     def experiment(self) -> Experiment:
         """Everything in the file; what its tables hold stays unchecked. Raises `SettingsError`."""
@@ -131,9 +131,12 @@ def read_settings(path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
     return SettingsFile(path, document, key_lines(text), merged)
 
 
-def flight_from_document(document: Mapping[str, object]) -> Flight:
-    """The flight of a [flight] table in file units. Raises `SettingsError`, its lines without a place."""
-    return _flight({"flight": dict(document)}, lambda key: _Place(0, ""))
+def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:
+    """The flight of a [flight] table in file units; a track's path is from `folder`.
+
+    Raises `SettingsError`, its lines without a place.
+    """
+    return _flight({"flight": dict(document)}, lambda key: _Place(0, ""), folder)
 
 
 def document(flight: Flight) -> dict[str, Any]:
@@ -198,7 +201,8 @@ def _parsed(value: str) -> object:
         return value.strip()
 
 
-def _flight(document: Mapping[str, object], place: Callable[[Key], _Place]) -> Flight:
+def _flight(document: Mapping[str, object], place: Callable[[Key], _Place], folder: Path) -> Flight:
+    """The flight, checked whole. A track's path is from `folder`, where the settings are."""
     match document:
         case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS:
             table = _flight_document_table(name, law.get("gains") == _CUSTOM)
@@ -206,6 +210,9 @@ def _flight(document: Mapping[str, object], place: Callable[[Key], _Place]) -> F
             table = _flight_document_table(None, False)
     flight = _checked(table, document, place)
     assert isinstance(flight, Flight)
+    if flight.target.track is not None:
+        track = str(folder.absolute() / flight.target.track)
+        flight = replace(flight, target=replace(flight.target, track=track))
     found = [_Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
     if found:
         raise _error(found, place)

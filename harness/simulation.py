@@ -1,4 +1,4 @@
-"""The one loop: target, observation, guidance law, plant."""
+"""The one loop: target, sensor, estimator, observation, guidance law, plant."""
 
 import math
 from struct import Struct
@@ -6,8 +6,9 @@ from struct import Struct
 import numpy as np
 
 from autopilot.guidance import Guidance, Observation, Step
+from harness.estimation import Estimation
 from harness.flight import Flight, plant_of, problems
-from harness.flight_log import COLUMNS, FlightLog
+from harness.flight_log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
 from harness.plant import End, Outcome
 from harness.state import State
 from harness.target import TargetState
@@ -21,26 +22,42 @@ def simulate(flight: Flight) -> FlightLog:
     for problem in problems(flight):
         raise ValueError(f"{problem.name}: {problem.message}")
     target, law = flight.target.start(), flight.law.start()
+    estimation = Estimation(flight, target) if flight.estimator.kind == "ekf" else None
     flying = plant_of(flight).start(flight.start, flight.wind)
     period, last = flight.guidance_period, flight.periods
     wind, nominal_airspeed = flight.wind.steady, flight.start.airspeed
-    in_sight = (flight.metrics.monitoring_range or math.inf) - flight.law.standoff
-    row = Struct(f"{len(COLUMNS)}d")
-    table, rows = bytearray((last + 1) * row.size), 0
+    monitoring_range = flight.metrics.monitoring_range
+    row, stride = Struct(f"{len(LOOP_COLUMNS)}d"), 8 * len(COLUMNS)
+    table, rows = bytearray((last + 1) * stride), 0
     outcome, reason = Outcome.COMPLETED, ""
     try:
         for k in range(last + 1):
-            state, seen = flying.state, target(k * period)
+            state, truth = flying.state, target(k * period)
+            seen = estimation.at(k) if estimation else truth
             guidance = command(law, observe(state, nominal_airspeed, wind, seen))
-            row.pack_into(table, rows * row.size, k * period, *state, *seen, *guidance)
+            row.pack_into(table, rows * stride, k * period, *state, *truth, *guidance)
             rows += 1
-            if guidance.range_error > in_sight:
-                raise End(Outcome.TARGET_LOST, f"beyond the monitoring range, {flight.metrics.monitoring_range:g} m")
+            if monitoring_range and math.dist(state[:2], truth[:2]) > monitoring_range:
+                raise End(Outcome.TARGET_LOST, f"beyond the monitoring range, {monitoring_range:g} m")
             if k < last:
                 flying.advance(guidance.heading_rate, period)
     except End as end:
         outcome, reason = end.outcome, str(end)
-    return FlightLog(flight, outcome, reason, np.frombuffer(table)[: rows * len(COLUMNS)].reshape(rows, -1))
+    log = FlightLog(flight, outcome, reason, np.frombuffer(table).reshape(-1, len(COLUMNS))[:rows])
+    return completed(log, estimation.rows[:rows] if estimation else None)
+
+
+def completed(log: FlightLog, estimates: list[tuple[float, ...]] | None) -> FlightLog:
+    """The log with the columns that the loop leaves: true range error, and what was seen of the target (None: all)."""
+    x_r, y_r = log["north"] - log["target_north"], log["east"] - log["target_east"]
+    log["range_error"][:] = np.sqrt(x_r * x_r + y_r * y_r) - log.flight.law.standoff  # as the laws compute it
+    seen = log.table[:, COLUMNS.index(SEEN_COLUMNS[0]) :]
+    if estimates is None:
+        first = COLUMNS.index(TargetState._fields[0])
+        seen[:, :4], seen[:, 4:] = log.table[:, first : first + 4], math.nan
+    elif estimates:
+        seen[:] = estimates
+    return log
 
 
 def observe(state: State, nominal_airspeed: float, wind: tuple[float, float], seen: TargetState) -> Observation:

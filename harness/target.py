@@ -1,14 +1,16 @@
-"""The target on the ground: straight, or in segments of constant acceleration and turn rate, in closed form."""
+"""The target on the ground: in segments of constant acceleration and turn rate, in closed form; or as recorded."""
 
 import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from autopilot.quantities import About, Degrees, DegreesPerSecond, Metres, MetresPerSecond, MetresPerSecond2, Seconds
+from harness.track import load_track
 
 _FASTEST_TURN = math.radians(1000.0)  # far beyond any target; keeps the closed form's angles meaningful
 
@@ -42,9 +44,13 @@ class Target:
     speed: Annotated[MetresPerSecond, Ge(0), About("initial speed")] = 0.0
     heading: Annotated[Degrees, About("initial direction, clockwise from north")] = 0.0
     segments: Annotated[tuple[Segment, ...], About("manoeuvres")] = ()
+    track: Annotated[str | None, About("a recorded track instead, a CSV: time_s, north_m, east_m")] = None
 
     def start(self) -> Callable[[float], TargetState]:
-        """The motion: `at(time)` in s gives the target's state."""
+        """The motion: `at(time)` in s gives the target's state. Raises `TrackError`."""
+        if self.track is not None:
+            recorded = load_track(Path(self.track)).at
+            return lambda time: TargetState._make(recorded(time))
         legs = self.legs()
         if len(legs) == 1 and not self.speed and not legs[0].acceleration:
             rest = TargetState(*self.position, 0.0, 0.0)
@@ -52,8 +58,12 @@ class Target:
         begins = [leg.begin for leg in legs]
         return lambda time: legs[bisect_right(begins, time) - 1].at(time)
 
+    def breakpoints(self) -> list[float]:
+        """The times at which the motion changes its formula."""
+        return load_track(Path(self.track)).begins if self.track is not None else [leg.begin for leg in self.legs()]
+
     def legs(self) -> list["Leg"]:
-        """The motion cut at every change of acceleration or turn rate; the last leg has no end."""
+        """The motion without a track, cut at every change of acceleration or turn rate; the last leg has no end."""
         cuts = sorted({0.0, *(s.from_ for s in self.segments), *(s.to for s in self.segments)})
         legs: list[Leg] = []
         n, e, speed, heading = *self.position, self.speed, self.heading

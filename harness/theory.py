@@ -7,7 +7,7 @@ from autopilot.nftsm import Nftsm
 
 def tsm_time(x0: float, alpha1: float, beta1: float) -> float:
     """Remark 3: when x' = -alpha1 sig^beta1(x) reaches 0 from x0, s; 0 < beta1 < 1."""
-    return abs(x0) ** (1.0 - beta1) / (alpha1 * (1.0 - beta1))
+    return math.pow(abs(x0), 1.0 - beta1) / (alpha1 * (1.0 - beta1))
 
 
 def ftsm_time(x0: float, alpha2: float, beta2: float, alpha3: float, beta3: float) -> float:
@@ -33,7 +33,7 @@ def reaching_time(g: Nftsm, s0: float) -> float:
 
 def manifold_reach(g: Nftsm) -> float:
     """The largest heading error on the manifold, alpha2 (pi/2)^beta2 + alpha3 (pi/2)^beta3, rad: Eq. (28)."""
-    return g.alpha2 * (math.pi / 2) ** g.beta2 + g.alpha3 * (math.pi / 2) ** g.beta3
+    return float(g.alpha2 * (math.pi / 2) ** g.beta2 + g.alpha3 * (math.pi / 2) ** g.beta3)
 
 
 def boundary_heading_error(g: Nftsm) -> float:
@@ -47,4 +47,4 @@ def longest_stable_period(g: Nftsm, s: float) -> float:
     With the command held for T the reaching law becomes s -> s - T (k2 s + k3 sig^gamma1(s)); it shrinks |s| while
     T (k2 + k3 |s|^(gamma1 - 1)) < 2. As s goes to 0 no period is short enough: below some |s| a held command chatters.
     """
-    return 2.0 / (g.k2 + g.k3 * abs(s) ** (g.gamma1 - 1.0))
+    return 2.0 / (g.k2 + g.k3 * math.pow(abs(s), g.gamma1 - 1.0))

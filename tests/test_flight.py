@@ -78,5 +78,10 @@ def test_more_heading_rate_than_the_bank_limit_gives_is_a_warning() -> None:
     assert ["inner loop" in text for text in warnings(steep)] == [True]
 
 
+def test_an_airspeed_outside_the_envelope_is_a_warning() -> None:
+    slow = replace(FLIGHT, plant="sixdof", aircraft="aerosonde")
+    assert ["18 to 35 m/s" in text for text in warnings(slow)] == [True]
+
+
 def test_a_kinematic_start_needs_no_height() -> None:
     assert Kinematic().start(Start(altitude=0.0), Wind()).state.altitude == 0.0

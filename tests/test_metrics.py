@@ -98,3 +98,8 @@ def test_what_a_plant_does_not_have_is_none() -> None:
         "overshoot_m", "heading_rate_lag_s", "heading_rate_gain", "turn_ratio", "sideslip_rms_deg", "sideslip_peak_deg",
         "bank_peak_deg", "lateral_acceleration_rms_mps2",
     }  # fmt: skip
+
+
+def test_a_flight_that_ended_before_its_first_row_has_no_metric() -> None:
+    log = log_of()
+    assert metrics(FlightLog(log.flight, Outcome.INVALID, "", log.table[:0])) == dict.fromkeys(MEANING)

@@ -1,0 +1,162 @@
+"""What the law knows of the target: the truth, or the paper's extended Kalman filter (Section 2.2).
+
+A sensor gives range and azimuth; the filter's state is X = (x, x', y, y') of Eq. (4), north and east of the flight's
+origin. Where the paper is silent: the filter starts from the first measurement, at `initial_velocity`; between two
+measurements the estimate moves at constant velocity. Where its print cannot be meant: Z_k observes X_k (Eq. (4) has
+Z_k+1), and arctan(y/x) is atan2(y, x).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+from numpy.typing import NDArray
+
+from autopilot.angles import wrap
+from autopilot.quantities import About, Metres, MetresPerSecond, Seconds, Unit
+
+Array = NDArray[np.float64]
+
+SquareMetres = Annotated[float, Unit("m2", 1.0)]
+SquareRadians = Annotated[float, Unit("rad2", 1.0)]  # not degrees: the paper's 0.015 rad^2, to the digit
+SquareMetresPerSecond = Annotated[float, Unit("m2_s2", 1.0)]
+
+_CLOSEST = 1e-6  # m: nearer to the sensor than this a target has no azimuth
+
+
+class Measurement(NamedTuple):
+    """The target as the sensor sees it, Z of Eq. (4), or the difference of two such. m; rad, clockwise from north."""
+
+    range: float
+    azimuth: float
+
+
+class Estimate(NamedTuple):
+    """The target as the filter knows it at one moment, and the variance of each number. SI, north-east."""
+
+    target_north: float
+    target_east: float
+    target_velocity_north: float
+    target_velocity_east: float
+    target_north_variance: float
+    target_east_variance: float
+    target_velocity_north_variance: float
+    target_velocity_east_variance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimator:
+    """What the law knows of the target. Defaults are the paper's; its diag(0.5, 0.015) is in m^2 and rad^2."""
+
+    kind: Annotated[
+        Literal["truth", "ekf"], About("truth: the target's own state; ekf: as tracked by range and azimuth")
+    ] = "truth"
+    period: Annotated[Seconds, Gt(0), Le(1e3), About("of the measurements, T_s")] = 0.5
+    sensor_position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (0.0, 0.0)
+    range_variance: Annotated[SquareMetres, Gt(0), About("of the measurement noise, P")] = 0.5
+    azimuth_variance: Annotated[SquareRadians, Gt(0), About("of the measurement noise, P")] = 0.015
+    process_position_variance: Annotated[SquareMetres, Ge(0), About("per axis and measurement period, Q")] = 0.2
+    process_velocity_variance: Annotated[SquareMetresPerSecond, Ge(0), About("per axis and measurement period, Q")] = (
+        0.01
+    )
+    initial_position: Annotated[
+        tuple[Metres, Metres] | None, About("north, east; without it the first measurement")
+    ] = None
+    initial_position_variance: Annotated[SquareMetres, Ge(0), About("per axis, of a given initial_position")] = 1.0
+    initial_velocity: Annotated[tuple[MetresPerSecond, MetresPerSecond], About("north, east")] = (0.0, 0.0)
+    initial_velocity_variance: Annotated[
+        SquareMetresPerSecond, Ge(0), About("per axis; by default (2 m/s)^2, the speed of the paper's target")
+    ] = 4.0
+
+    def start(self) -> "Tracker":
+        """The filter before its first measurement."""
+        from filterpy.kalman import ExtendedKalmanFilter  # takes half a second: who knows the truth does without
+
+        T_s, q, q_dot = self.period, self.process_position_variance, self.process_velocity_variance
+        kalman = ExtendedKalmanFilter(dim_x=4, dim_z=2)
+        kalman.F = np.kron(np.eye(2), [[1.0, T_s], [0.0, 1.0]])
+        kalman.Q = np.diag([q, q_dot, q, q_dot])
+        kalman.R = np.diag([self.range_variance, self.azimuth_variance])
+        return Tracker(self, kalman)
+
+
+class Tracker:
+    """The filter in flight: `update` at every measurement, `at` in between."""
+
+    def __init__(self, settings: Estimator, kalman: Any) -> None:
+        self.kalman = kalman  # filterpy's, which has no types: x, P, y and mahalanobis are those of the latest update
+        self._settings = settings
+        self._x: list[float] = []
+        self._P: list[list[float]] = []
+
+    def update(self, measured: Measurement) -> Measurement:
+        """Takes in the next measurement and gives its innovation: NaN when the filter started from it."""
+        kalman, sensor, innovation = self.kalman, self._settings.sensor_position, Measurement(math.nan, math.nan)
+        begins = not self._x
+        if begins:
+            kalman.x, kalman.P = initial(self._settings, measured)
+        else:
+            kalman.predict()
+        if not begins or self._settings.initial_position is not None:
+            kalman.update(np.array([measured]).T, linearised, expected, args=sensor, hx_args=sensor, residual=residual)
+            innovation = Measurement(*kalman.y[:, 0].tolist())
+        self._x, self._P = kalman.x[:, 0].tolist(), kalman.P.tolist()
+        return innovation
+
+    def at(self, age: float) -> Estimate:
+        """The estimate `age` s after the latest measurement: constant velocity, and a share of Q for the time gone."""
+        (x, x_dot, y, y_dot), P, s = self._x, self._P, self._settings
+        share = age / s.period
+        q, q_dot = share * s.process_position_variance, share * s.process_velocity_variance
+        return Estimate(
+            x + age * x_dot,
+            y + age * y_dot,
+            x_dot,
+            y_dot,
+            P[0][0] + age * (2.0 * P[0][1] + age * P[1][1]) + q,
+            P[2][2] + age * (2.0 * P[2][3] + age * P[3][3]) + q,
+            P[1][1] + q_dot,
+            P[3][3] + q_dot,
+        )
+
+
+def initial(s: Estimator, measured: Measurement) -> tuple[Array, Array]:
+    """X and its covariance at the first measurement: as set, or the measured position with the measurement's noise."""
+    if s.initial_position is None:
+        r, cos, sin = measured.range, math.cos(measured.azimuth), math.sin(measured.azimuth)
+        x, y = s.sensor_position[0] + r * cos, s.sensor_position[1] + r * sin
+        turned = np.array([[cos, -sin], [sin, cos]])
+        position = turned @ np.diag([s.range_variance, r * r * s.azimuth_variance]) @ turned.T
+    else:
+        x, y = s.initial_position
+        position = s.initial_position_variance * np.eye(2)
+    P = s.initial_velocity_variance * np.eye(4)
+    P[::2, ::2] = position
+    return np.array([[x], [s.initial_velocity[0]], [y], [s.initial_velocity[1]]]), P
+
+
+def measurement(x: float, y: float, x_s: float, y_s: float) -> Measurement:
+    """H_t without its noise: what a sensor at (x_s, y_s) sees of a target at (x, y)."""
+    return Measurement(math.hypot(x - x_s, y - y_s), math.atan2(y - y_s, x - x_s))
+
+
+def expected(X: Array, x_s: float, y_s: float) -> Array:
+    """H_t at the state X, a column; the sensor at (x_s, y_s)."""
+    x, _, y, _ = X[:, 0].tolist()
+    return np.array([measurement(x, y, x_s, y_s)]).T
+
+
+def linearised(X: Array, x_s: float, y_s: float) -> Array:
+    """The derivative of H_t by the state X."""
+    x, _, y, _ = X[:, 0].tolist()
+    r = max(math.hypot(x - x_s, y - y_s), _CLOSEST)
+    c, s = (x - x_s) / r, (y - y_s) / r
+    return np.array([[c, 0.0, s, 0.0], [-s / r, 0.0, c / r, 0.0]])
+
+
+def residual(z: Array, z_expected: Array) -> Array:
+    """The innovation z - z_expected, its azimuth wrapped: a target that crosses south has not gone round."""
+    (r, alpha), (r_expected, alpha_expected) = z[:, 0].tolist(), z_expected[:, 0].tolist()
+    return np.array([[r - r_expected], [wrap(alpha - alpha_expected)]])

@@ -1,0 +1,112 @@
+"""A recorded track of the target: a CSV of times and positions, read with located errors and joined smoothly.
+
+Between the rows runs a cubic spline (not-a-knot): velocity, acceleration and turn rate are continuous, and a track that
+is a cubic in time comes back exactly. A monotone interpolant (PCHIP) would not swing where a target starts or stops,
+but its acceleration jumps at every row, and the law would be fed these jumps as the target's.
+"""
+
+import math
+from bisect import bisect_right
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+HEADER = ("time_s", "north_m", "east_m")
+FEWEST = 4  # rows that fix a cubic
+
+_SLOWEST = 1e-6  # m/s: a slower target has no direction
+_Row = tuple[float, float, float]
+Motion = tuple[float, float, float, float, float, float]  # north, east, their rates, that of the speed, turn rate
+
+
+class TrackError(ValueError):
+    """What is wrong with a track, in one line: `FILE:LINE: what`."""
+
+
+class Piece(NamedTuple):
+    """The track from `begin` to the next row: cubics in the time since, the highest power's coefficient first."""
+
+    begin: float
+    north: list[float]
+    east: list[float]
+
+    def at(self, time: float) -> Motion:
+        t = time - self.begin
+        (x3, x2, x1, x0), (y3, y2, y1, y0) = self.north, self.east
+        v_x, v_y = (3.0 * x3 * t + 2.0 * x2) * t + x1, (3.0 * y3 * t + 2.0 * y2) * t + y1
+        a_x, a_y = 6.0 * x3 * t + 2.0 * x2, 6.0 * y3 * t + 2.0 * y2
+        v = math.hypot(v_x, v_y)
+        along, turn = 0.0, 0.0
+        if v > _SLOWEST:
+            along, turn = (v_x * a_x + v_y * a_y) / v, (v_x * a_y - v_y * a_x) / (v * v)
+        return ((x3 * t + x2) * t + x1) * t + x0, ((y3 * t + y2) * t + y1) * t + y0, v_x, v_y, along, turn
+
+
+class Track:
+    """The whole curve. The flight begins at time 0 and must end by `end`, s."""
+
+    def __init__(self, pieces: list[Piece], end: float) -> None:
+        self.begins, self.end = [piece.begin for piece in pieces], end
+        self._pieces = pieces
+
+    def at(self, time: float) -> Motion:
+        """The target's motion at `time`, s. SI, rad, turning clockwise."""
+        return self._pieces[max(0, bisect_right(self.begins, time) - 1)].at(time)
+
+
+def load_track(path: Path) -> Track:
+    """The track in a file. Raises `TrackError`."""
+    try:
+        return _load(path, path.stat().st_mtime_ns)
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "no text in UTF-8"
+        raise TrackError(f"{path}: {why}") from None
+
+
+@lru_cache(maxsize=16)
+def _load(path: Path, modified: int) -> Track:
+    from scipy.interpolate import CubicSpline  # takes a tenth of a second: who has no track does without
+
+    times, norths, easts = zip(*_rows(path), strict=True)
+    north, east = (CubicSpline(times, values).c.T.tolist() for values in (norths, easts))
+    return Track([Piece(*piece) for piece in zip(times[:-1], north, east, strict=True)], times[-1])
+
+
+def _rows(path: Path) -> list[_Row]:
+    lines = path.read_text(encoding="utf-8-sig").rstrip().split("\n")
+    header = tuple(cell.strip() for cell in lines[0].split(","))
+    if header != HEADER:
+        raise TrackError(f"{path}:1: the header is {lines[0].strip()[:60]!r}, must be {','.join(HEADER)!r}")
+    rows: list[_Row] = []
+    for number, line in enumerate(lines[1:], 2):
+        try:
+            row = _row(line)
+            if rows and row[0] <= rows[-1][0]:
+                how = "is given twice" if row[0] == rows[-1][0] else f"comes after {rows[-1][0]:g}"
+                raise ValueError(f"time_s {row[0]:g} {how}, must increase from row to row")
+            if not rows and row[0] > 0.0:
+                raise ValueError(f"the track begins at {row[0]:g} s, must begin at 0 or before, as the flight does")
+        except ValueError as error:
+            raise TrackError(f"{path}:{number}: {error}") from None
+        rows.append(row)
+    if len(rows) < FEWEST:
+        raise TrackError(f"{path}:{len(lines)}: {len(rows)} rows under the header, must be at least {FEWEST}")
+    return rows
+
+
+def _row(line: str) -> _Row:
+    cells = [cell.strip() for cell in line.split(",")]
+    if len(cells) != len(HEADER):
+        raise ValueError(f"{len(cells) if line.strip() else 'no'} numbers, must be {len(HEADER)}: {', '.join(HEADER)}")
+    time, north, east = (_number(name, cell) for name, cell in zip(HEADER, cells, strict=True))
+    return time, north, east
+
+
+def _number(name: str, cell: str) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {cell[:60]!r}, must be a finite number" if cell else f"{name} is missing")
+    return number
