@@ -1,4 +1,4 @@
-"""Writes each airframe's JSBSim model from its data: `python -m aircraft.write_models` (needs the `dev` extra)."""
+"""Writes each airframe's JSBSim model from its data: `python -m aircraft.write_models`."""
 
 import tomllib
 from pathlib import Path

@@ -9,6 +9,7 @@ from harness.commands.demo import demo
 from harness.commands.doctor import doctor
 from harness.commands.fly import fly
 from harness.commands.list import list_
+from harness.commands.reproduce import reproduce
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -22,7 +23,7 @@ def harness() -> None:
     """
 
 
-for command in (fly, check, list_, demo, doctor):
+for command in (fly, check, list_, demo, reproduce, doctor):
     harness.add_command(command)
 
 
