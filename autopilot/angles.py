@@ -1,4 +1,4 @@
-"""Angles and the signed power, on plain floats."""
+"""Angles, on plain floats."""
 
 import math
 
@@ -9,8 +9,3 @@ def wrap(angle: float) -> float:
         return angle
     wrapped = math.remainder(angle, math.tau)
     return wrapped if wrapped < math.pi else -math.pi
-
-
-def sig(x: float, power: float) -> float:
-    """sig^power(x) = sign(x) |x|^power (paper, after Eq. 11); `power` > 0."""
-    return math.copysign(math.pow(abs(x), power), x)

@@ -18,6 +18,7 @@ from scipy.stats import chi2
 from autopilot.estimator import Estimator
 from harness.estimation import sensor
 from harness.randomness import stream
+from harness.reproduce import EXPERIMENTS
 from harness.target import Segment, Target, TargetState
 
 Array = NDArray[np.float64]
@@ -111,16 +112,7 @@ S_SHAPE = Target(
         Segment(from_=750.0, to=1000.0, turn_rate=_QUARTER),
     ),
 )
-MANOEUVRING = Target(
-    speed=2.0,
-    heading=math.radians(-45.0),
-    segments=(
-        Segment(from_=300.0, to=350.0, acceleration=0.1),
-        Segment(from_=400.0, to=410.0, turn_rate=math.radians(-10.0)),
-        Segment(from_=460.0, to=470.0, acceleration=0.4, turn_rate=math.radians(3.0)),
-        Segment(from_=550.0, to=570.0, turn_rate=math.radians(1.0)),
-    ),
-)
+MANOEUVRING = EXPERIMENTS["manoeuvres"].target
 
 
 def fitting_case(distance: float, known: bool) -> Case:

@@ -31,7 +31,7 @@ DOCS = Path(__file__).parent.parent / "docs" / "estimator.md"
 
 def flight(plant: str = "kinematic", **settings: object) -> Flight:
     defaults = {"law": law("nftsm", "paper_1"), "duration": 20.0, "target": MOVING, "estimator": PAPER}
-    return Flight(plant=plant, **{**defaults, **settings})  # type: ignore[arg-type]
+    return Flight(plant=plant, **{**defaults, **settings})
 
 
 def column(x: float, x_dot: float, y: float, y_dot: float) -> np.ndarray:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot import nftsm
-from autopilot.angles import sig, wrap
+from autopilot.angles import wrap
 from autopilot.guidance import Guidance, Observation
 from autopilot.laws import LAWS, law
 from autopilot.standoff import StandoffLaw, course_rate_ratio, ground_speed, heading_from_course, relative_motion
@@ -49,6 +49,11 @@ def moment(t: float, psi: float = 0.4, turn: float = 0.0) -> Observation:
         target_acceleration=a,
         target_turn_rate=w,
     )
+
+
+def sig(x: float, power: float) -> float:
+    """The signed power of the paper, after Eq. (11)."""
+    return math.copysign(abs(x) ** power, x)
 
 
 def rate(f: Callable[[float], float], dt: float = 1e-4) -> float:

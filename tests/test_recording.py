@@ -28,7 +28,7 @@ PERIOD_NS = 50_000_000
 
 
 def flight(plant: str, **settings: object) -> Flight:
-    return Flight(plant=plant, law=law("nftsm", "paper_1"), duration=20.0, **settings)  # type: ignore[arg-type]
+    return Flight(plant=plant, law=law("nftsm", "paper_1"), duration=20.0, **settings)
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ STICK = aircraft.folder("ultra_stick_25e")
 
 def flight(**changes: object) -> Flight:
     base = Flight(plant="sixdof", law=law("nftsm", "paper_1"), duration=20.0)
-    return replace(base, **changes)  # type: ignore[arg-type]  # the fields of Flight
+    return replace(base, **changes)
 
 
 @pytest.mark.parametrize("name", aircraft.names())
@@ -95,7 +95,7 @@ def test_a_mirrored_flight_mirrors_the_flight(plant: str, tolerance: float) -> N
 
 def test_a_flight_into_the_ground_ends_as_ground() -> None:
     flying = SixDof(STICK, STEP, True).start(Start(altitude=30.0), Wind())
-    flying._run.__self__["inner-loop/command/altitude-m"] = -100.0  # type: ignore[attr-defined]  # the bound fdm
+    flying._run.__self__["inner-loop/command/altitude-m"] = -100.0
     with pytest.raises(End) as end:
         for _ in range(2000):
             flying.advance(0.0, 0.05)
@@ -112,7 +112,7 @@ def test_a_number_that_is_not_finite_ends_the_flight_as_invalid() -> None:
 
 def test_a_roll_beyond_80_degrees_ends_as_departed() -> None:
     flying = SixDof(STICK, STEP, True).start(Start(), Wind())
-    fdm = flying._run.__self__  # type: ignore[attr-defined]  # the bound fdm
+    fdm = flying._run.__self__
     fdm["inner-loop/gain/bank-p"] = -0.9  # a bank loop with its sign turned round
     with pytest.raises(End) as end:
         for _ in range(400):

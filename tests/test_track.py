@@ -35,7 +35,7 @@ def circle(tmp_path: Path) -> Path:
 
 def flight(track: Path, **settings: object) -> Flight:
     defaults = {"law": law("smc"), "duration": 60.0, "target": Target(track=str(track))}
-    return Flight(plant="kinematic", **{**defaults, **settings})  # type: ignore[arg-type]
+    return Flight(plant="kinematic", **{**defaults, **settings})
 
 
 def test_a_track_that_is_a_cubic_in_time_comes_back_exactly(tmp_path: Path) -> None:
