@@ -16,8 +16,8 @@ import aircraft
 from autopilot.laws import law
 from harness.flight import Flight
 from harness.flight_log import COLUMNS
+from harness.plants.sixdof import SixDof, engage, load, trim
 from harness.simulation import simulate
-from harness.sixdof import SixDof, engage, load, trim
 
 AIRFRAMES = ("ultra_stick_25e", "skywalker_x8")
 

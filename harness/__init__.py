@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from harness.recording import read_recording as read_flight
+    from harness.review.recording import read_recording as read_flight
     from harness.settings import load_flight
     from harness.simulation import simulate
 
@@ -15,7 +15,7 @@ __all__ = ["load_flight", "read_flight", "simulate"]
 
 _HOME = {
     "load_flight": ("harness.settings", "load_flight"),
-    "read_flight": ("harness.recording", "read_recording"),
+    "read_flight": ("harness.review.recording", "read_recording"),
     "simulate": ("harness.simulation", "simulate"),
 }
 

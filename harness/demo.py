@@ -69,7 +69,7 @@ def fly_all() -> Iterator[Flown]:
 
 def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
     """Writes one recording per pair of the kinematic aircraft and an airframe under the same law."""
-    from harness.recording import write_recording
+    from harness.review.recording import write_recording
 
     folder.mkdir(parents=True, exist_ok=True)
     for reference in (f for f in flown if f.plant == KINEMATIC):

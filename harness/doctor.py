@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import aircraft
 from harness.plant import Start
-from harness.sixdof import compare_units, wind_triangle_error
+from harness.plants.sixdof import compare_units, wind_triangle_error
 from harness.wind import Wind
 
 PACKAGES = ("standoff-harness", "jsbsim", "numpy", "filterpy", "pandas", "pydantic", "rerun-sdk")

@@ -12,8 +12,8 @@ import aircraft
 from autopilot.estimator import Estimator
 from autopilot.guidance import Law
 from autopilot.quantities import About, Metres, Seconds
-from harness.kinematic import Kinematic
 from harness.plant import Plant, Start
+from harness.plants.kinematic import Kinematic
 from harness.target import Target, TargetState
 from harness.track import TrackError, load_track
 from harness.wind import Wind
@@ -71,7 +71,7 @@ def plant_of(flight: Flight) -> Plant:
     """The plant that the flight names."""
     if flight.plant == "kinematic":
         return Kinematic()
-    from harness.sixdof import SixDof  # JSBSim is loaded by those who fly it
+    from harness.plants.sixdof import SixDof  # JSBSim is loaded by those who fly it
 
     return SixDof(aircraft.folder(flight.aircraft), flight.step, flight.inner_loop.rate_trim)
 

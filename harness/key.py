@@ -39,7 +39,7 @@ def _files(flight: Flight) -> Iterator[tuple[str, Path]]:
         yield "target/track", Path(flight.target.track)
     if flight.plant == "sixdof":
         yield "autopilot/inner_loop.xml", on_board / "inner_loop.xml"
-        yield "harness/planet.xml", Path(__file__).parent / "planet.xml"
+        yield "harness/plants/planet.xml", Path(__file__).parent / "plants" / "planet.xml"
         airframe = aircraft.folder(flight.aircraft)
         yield "aircraft/model", aircraft.model(airframe)
         yield "aircraft/airframe.toml", airframe / "airframe.toml"

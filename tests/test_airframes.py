@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import aircraft
 from aircraft.write_models import jsbsim_model
 from harness.plant import Start
-from harness.sixdof import FT, SLUG, NoTrimError, engage, load, trim
+from harness.plants.sixdof import FT, SLUG, NoTrimError, engage, load, trim
 from harness.wind import Wind
 
 LBF = 4.4482216152605  # N

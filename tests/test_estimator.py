@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from autopilot.estimator import Estimator, Measurement, Tracker, initial, linearised, measurement, residual
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.laws import law
-from harness.consistency import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
 from harness.estimation import Estimation, sensor
 from harness.flight import Flight, MetricSettings, plant_of, problems
 from harness.flight_log import COLUMNS, FlightLog
+from harness.paper.consistency import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
 from harness.plant import Outcome
 from harness.randomness import stream
 from harness.simulation import command, observe, simulate

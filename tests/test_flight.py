@@ -8,8 +8,8 @@ import pytest
 
 from autopilot.laws import law
 from harness.flight import Flight, feasibility_margin, needed_heading_rate, problems, warnings
-from harness.kinematic import Kinematic
 from harness.plant import Start
+from harness.plants.kinematic import Kinematic
 from harness.target import Segment, Target
 from harness.wind import Wind
 

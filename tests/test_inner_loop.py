@@ -8,7 +8,7 @@ import pytest
 
 import aircraft
 from harness.plant import Start
-from harness.sixdof import SixDof
+from harness.plants.sixdof import SixDof
 from harness.state import State
 from harness.wind import Wind
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.kinematic import Kinematic
 from harness.plant import Start
+from harness.plants.kinematic import Kinematic
 from harness.wind import Wind
 
 START = Start(position=(5.0, -7.0), heading=0.3, airspeed=13.0)

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from harness.paper_page import page
-from harness.reproduce import NUMBERS, VARIANTS, Number, Reading, Reproduced, flown, reproduced, table
+from harness.paper.page import page
+from harness.paper.reproduce import NUMBERS, VARIANTS, Number, Reading, Reproduced, flown, reproduced, table
 
 TABLE_3 = [number for number in NUMBERS if number.where == "Table 3" and number.law != "NFTSM as printed"]
 AS_PRINTED = [number for number in NUMBERS if number.law == "NFTSM as printed"]

@@ -15,8 +15,8 @@ import aircraft
 from autopilot.laws import law
 from harness.flight import Flight
 from harness.plant import End, Outcome, PlantError, Start
+from harness.plants.sixdof import ModelError, SixDof, load, wind_triangle_error, write
 from harness.simulation import simulate
-from harness.sixdof import ModelError, SixDof, load, wind_triangle_error, write
 from harness.target import Segment, Target
 from harness.wind import Wind
 

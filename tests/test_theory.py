@@ -12,9 +12,7 @@ from autopilot.laws import law
 from autopilot.nftsm import Nftsm, reaching
 from harness.flight import Flight
 from harness.flight_log import FlightLog
-from harness.plant import Start
-from harness.simulation import simulate
-from harness.theory import (
+from harness.paper.theory import (
     boundary_heading_error,
     ftsm_time,
     longest_stable_period,
@@ -22,6 +20,8 @@ from harness.theory import (
     reaching_time,
     tsm_time,
 )
+from harness.plant import Start
+from harness.simulation import simulate
 
 
 def gains(**override: float) -> Nftsm:

@@ -52,7 +52,7 @@ def fly(file: Path, overrides: tuple[str, ...], rrd: Path | None, as_json: bool)
         "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # none without a limit
     }
     if rrd is not None:
-        from harness.recording import write_recording
+        from harness.review.recording import write_recording
 
         rows = "\n".join(f"| {name} | {number(value)} |" for name, value in judged.items())
         set_to = json.dumps(result["flight"], indent=1)

@@ -17,9 +17,9 @@ def reproduce(out: Path) -> None:
     from rich.console import Console
     from rich.progress import Progress
 
-    from harness import reproduce as job
     from harness.commands.telling import writable
-    from harness.paper_page import page
+    from harness.paper import reproduce as job
+    from harness.paper.page import page
 
     out.mkdir(parents=True, exist_ok=True)
     path = writable(out / "paper.html")

@@ -1,4 +1,4 @@
-"""Is the estimator as sure as it ought to be? NEES and NIS over many seeds: `python -m harness.consistency [SEEDS]`.
+"""Is the estimator as sure as it ought to be? `python -m harness.paper.consistency [SEEDS]`: NEES and NIS.
 
 NEES, the error of the state squared over its covariance, is 4 on average for a filter that is as good as it believes
 itself, NIS, the same of the innovation, 2; more is overconfidence. The average over the seeds at one moment lies within
@@ -17,8 +17,8 @@ from scipy.stats import chi2
 
 from autopilot.estimator import Estimator
 from harness.estimation import sensor
+from harness.paper.reproduce import EXPERIMENTS
 from harness.randomness import stream
-from harness.reproduce import EXPERIMENTS
 from harness.target import Segment, Target, TargetState
 
 Array = NDArray[np.float64]

@@ -5,9 +5,9 @@ from functools import partial
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from harness import paper_figures as figures
 from harness.flight_log import FlightLog
-from harness.reproduce import EXPERIMENTS, VARIANTS, Reproduced, flown, shown
+from harness.paper import figures
+from harness.paper.reproduce import EXPERIMENTS, VARIANTS, Reproduced, flown, shown
 
 _DEG = math.degrees(1.0)
 _ERRORS = {"range_error": ("r [m]", 1.0), "sliding_variable": ("s [rad]", 1.0)}
@@ -21,8 +21,8 @@ _RATES = {"heading_rate_command": ("ω_ψ [deg/s]", _DEG), "heading": ("ψ_a [de
 
 def page(results: list[Reproduced]) -> str:
     """The HTML page."""
-    environment = Environment(loader=PackageLoader("harness", "."), autoescape=True, undefined=StrictUndefined)
-    return environment.get_template("paper.html.jinja").render(
+    environment = Environment(loader=PackageLoader("harness.paper", "."), autoescape=True, undefined=StrictUndefined)
+    return environment.get_template("page.html.jinja").render(
         results=results, variants=list(VARIANTS), shown=shown, figures=_figures()
     )
 

@@ -27,7 +27,7 @@ GROUND = 15.0  # m: below this height the flight has ended
 DEPARTURE_BANK = math.radians(80.0)
 STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
-_HARNESS = Path(__file__).parent
+_PLANTS = Path(__file__).parent
 _INNER_LOOP = Path(autopilot.__file__).parent
 _PROPERTY = re.compile(r"(?<![\w/])[a-z][\w-]*(?:/[\w-]+)+")
 _AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
@@ -75,7 +75,7 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_dt(step)  # before the model: its components keep the step they were made with
     try:
-        loaded = fdm.load_planet(str(_HARNESS / "planet.xml"), False) and fdm.load_model_with_paths(
+        loaded = fdm.load_planet(str(_PLANTS / "planet.xml"), False) and fdm.load_model_with_paths(
             airframe.name, str(airframe.parent), str(airframe), str(_INNER_LOOP), True
         )
     except jsbsim.BaseError as error:

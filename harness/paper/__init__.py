@@ -1,0 +1,1 @@
+"""The paper: its experiments flown anew, its figures, its theory, its claims."""

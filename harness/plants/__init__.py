@@ -1,0 +1,1 @@
+"""The plants, a rung of the ladder each."""
