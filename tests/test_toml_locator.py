@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from harness.toml_locator import Key, key_lines, nearest_line
+from harness.settings.toml_locator import Key, key_lines, nearest_line
 
 VALUES = (
     "1",

@@ -1,5 +1,6 @@
 """Where each key of a TOML text stands: tomllib tells values, not lines."""
 
+import json
 import re
 import tomllib
 from bisect import bisect_left
@@ -65,6 +66,11 @@ def nearest_line(lines: Mapping[Key, int], key: Key) -> int:
         if key[:length] in lines:
             return lines[key[:length]]
     return 1
+
+
+def dotted(key: Key) -> str:
+    """The key in one word, as a message names it; parts that TOML would quote are quoted."""
+    return ".".join(str(k) if re.fullmatch(r"[\w-]+", str(k), re.ASCII) else json.dumps(k) for k in key)
 
 
 def _names(key: str) -> list[str]:

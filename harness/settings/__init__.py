@@ -1,0 +1,19 @@
+"""Settings: the border between a TOML file (keys with unit suffixes, degrees) and a flight (SI, radians)."""
+
+from harness.settings.experiment import Experiment
+from harness.settings.file import SettingsFile, flight_from_document, load_flight, read_settings
+from harness.settings.keys import file_key, put
+from harness.settings.mistake import SettingsError
+from harness.settings.written import document
+
+__all__ = [
+    "Experiment",
+    "SettingsError",
+    "SettingsFile",
+    "document",
+    "file_key",
+    "flight_from_document",
+    "load_flight",
+    "put",
+    "read_settings",
+]

@@ -1,0 +1,134 @@
+"""A settings file as it was read: what it says, and where; and the flight in it."""
+
+import re
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from autopilot.laws import LAWS
+from harness.flight import Flight, problems
+from harness.settings.check import checked
+from harness.settings.experiment import CUSTOM, Experiment, document_table
+from harness.settings.keys import file_key, put
+from harness.settings.mistake import Mistake, Place, Places, SettingsError, settings_error
+from harness.settings.table import table_of
+from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsFile:
+    """A file as it was read, not checked yet."""
+
+    path: Path
+    document: Mapping[str, object]  # in file units, overrides merged
+    lines: Mapping[Key, int]
+    overrides: Mapping[Key, str]  # the texts KEY=VALUE
+
+    def flight(self) -> Flight:
+        """The file's one flight. Raises `SettingsError`."""
+        matrix = self.document.get("matrix")
+        if matrix and isinstance(matrix, dict):
+            raise SettingsError([f"{self._place(('matrix',)).text}: matrix: many flights, not one: use `harness run`"])
+        return _flight(self.document, self._place, self.path.parent)
+
+    def experiment(self) -> Experiment:
+        """Everything in the file; what its tables hold stays unchecked. Raises `SettingsError`."""
+        experiment = checked(table_of(Experiment), self.document, self._place)
+        assert isinstance(experiment, Experiment)
+        return experiment
+
+    def locate(self, name: str) -> str:
+        """Where a field is set, by its dotted name: `FILE:LINE: flight.start.airspeed_mps` for `start.airspeed`."""
+        key = file_key(name)
+        return f"{self._place(key).text}: {dotted(key)}"
+
+    def _place(self, key: Key) -> Place:
+        for length in range(len(key), 0, -1):
+            if key[:length] in self.overrides:
+                return Place(sys.maxsize, f"--set {self.overrides[key[:length]]}")
+        line = nearest_line(self.lines, key)
+        return Place(line, f"{self.path}:{line}")
+
+
+def load_flight(path: Path, overrides: Sequence[str] = ()) -> Flight:
+    """The flight that a file describes. `overrides` are texts KEY=VALUE, keys dotted below [flight], in file units.
+
+    Raises `SettingsError` with every mistake.
+    """
+    return read_settings(path, overrides).flight()
+
+
+def read_settings(path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
+    """A file with `overrides` merged into its [flight]. Raises `SettingsError` for a text that is no TOML."""
+    text = _text(path)
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        what, _, at = str(error).rpartition(" (at ")
+        told = re.match(r"line (\d+)", at)
+        line = told[1] if told else text.count("\n") + 1  # "at end of document"
+        raise SettingsError([f"{path}:{line}: no valid TOML: {what}"]) from None
+    except (ValueError, RecursionError) as error:  # a number of too many digits, arrays too deep
+        raise SettingsError([f"{path}: no valid TOML: {error}"]) from None
+    merged: dict[Key, str] = {}
+    wrong = []
+    for override in overrides:
+        name, equals, value = override.partition("=")
+        if not equals:
+            wrong.append(f"--set {override}: must be KEY=VALUE, as in law.gains=paper_1")
+            continue
+        try:
+            key = put(document, name, _parsed(value))
+        except SettingsError as error:
+            wrong.append(f"--set {override}: {error}")
+            continue
+        merged = {k: o for k, o in merged.items() if k[: len(key)] != key}  # what it replaces
+        merged[key] = override
+    if wrong:
+        raise SettingsError(wrong)
+    return SettingsFile(path, document, key_lines(text), merged)
+
+
+def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:
+    """The flight of a [flight] table in file units; a track's path is from `folder`.
+
+    Raises `SettingsError`, its lines without a place.
+    """
+    return _flight({"flight": dict(document)}, lambda key: Place(0, ""), folder)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise SettingsError([f"{path}: {error.strerror or error}"]) from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise SettingsError([f"{path}:{line}: no text in UTF-8"]) from None
+
+
+def _parsed(value: str) -> object:
+    try:
+        return tomllib.loads(f"v = {value}")["v"]
+    except ValueError:
+        return value.strip()
+
+
+def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flight:
+    """The flight, checked whole. A track's path is from `folder`, where the settings are."""
+    match document:
+        case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS:
+            table = document_table(name, law.get("gains") == CUSTOM)
+        case _:
+            table = document_table(None, False)
+    flight = checked(table, document, place)
+    assert isinstance(flight, Flight)
+    if flight.target.track is not None:
+        track = str(folder.absolute() / flight.target.track)
+        flight = replace(flight, target=replace(flight.target, track=track))
+    found = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
+    if found:
+        raise settings_error(found, place)
+    return flight

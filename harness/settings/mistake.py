@@ -1,0 +1,106 @@
+"""A mistake in the settings, and its wording: where, what is wrong, what is allowed, did you mean."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any, Literal, NamedTuple, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic_core import ErrorDetails
+
+from harness.settings.table import Setting, Table
+from harness.settings.toml_locator import Key, dotted
+
+_NOUNS: Mapping[object, str] = {float: "number", int: "whole number", str: "string"}
+_COUNTS = {2: "two", 3: "three"}
+_BOUNDS = {Gt: ">", Ge: ">=", Lt: "<", Le: "<="}
+
+
+class SettingsError(Exception):
+    """What is wrong with the settings, one line for each mistake."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        super().__init__("\n".join(lines))
+        self.lines = list(lines)
+
+
+class Place(NamedTuple):
+    """Where something stands, as a message begins."""
+
+    order: int  # in which mistakes are told
+    text: str
+
+
+Places = Callable[[Key], Place]  # where each key stands
+
+
+class Mistake(NamedTuple):
+    """What is wrong with the value at a key."""
+
+    key: Key
+    message: str
+
+
+def settings_error(mistakes: Sequence[Mistake], place: Places) -> SettingsError:
+    """The mistakes as one error, in the order of the file."""
+    placed = sorted(((place(key), f"{dotted(key)}: {message}") for key, message in mistakes), key=lambda p: p[0].order)
+    return SettingsError(list(dict.fromkeys(": ".join(filter(None, (at.text, told))) for at, told in placed)))
+
+
+def mistake(table: Table, document: Any, details: ErrorDetails) -> Mistake:
+    """A mistake that pydantic found, in words of the file."""
+    key: Key = ()
+    value = document
+    setting: Setting | None = None
+    for step in details["loc"]:
+        if setting and not setting.table:
+            break  # within a value, which is told whole
+        key = (*key, step)
+        if isinstance(step, int):
+            value = value[step]
+            continue
+        if step not in table.settings:
+            known = sorted(table.settings)
+            return Mistake(key, f"unknown key, known here: {', '.join(known)}{_did_you_mean(step, known)}")
+        setting = table.settings[step]
+        table = setting.table or table
+        if step not in value:
+            return Mistake(key, f"is missing, must be {_expected(setting)}")
+        value = value[step]
+    assert setting
+    expected = _expected(replace(setting, length=None) if isinstance(key[-1], int) else setting)
+    if details["type"] == "finite_number":
+        expected = expected.replace("number", "finite number")
+    return Mistake(key, f"is {_shown(value)}, must be {expected}{_did_you_mean(value, _choices(setting))}")
+
+
+def _expected(setting: Setting) -> str:
+    if choices := _choices(setting):
+        shown = [_shown(choice) for choice in choices]
+        return " or ".join(shown) if len(shown) < 3 else f"one of {', '.join(shown)}"
+    if setting.kind is bool:
+        return "true or false"
+    noun = _NOUNS.get(setting.kind, "table")
+    if setting.length is None:
+        noun = f"a {noun}"
+    elif setting.length is ...:
+        noun = f"a list of {noun}s"
+    else:
+        noun = f"{_COUNTS.get(setting.length, setting.length)} {noun}s"
+    bounds = [f"{_BOUNDS[type(b)]} {getattr(b, type(b).__name__.lower()):g}" for b in setting.bounds]
+    return " ".join([noun, " and ".join(bounds)]).strip() + (" or inf" if setting.infinite else "")
+
+
+def _choices(setting: Setting) -> tuple[str, ...]:
+    return get_args(setting.kind) if get_origin(setting.kind) is Literal else ()
+
+
+def _did_you_mean(word: object, known: Sequence[str]) -> str:
+    nearest = get_close_matches(str(word), known, n=1)
+    return f" - did you mean {nearest[0]!r}?" if nearest else ""
+
+
+def _shown(value: object) -> str:
+    text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,14 @@
+"""A number in the unit of its file key."""
+
+import math
+
+from autopilot.quantities import Unit
+
+
+def in_file(value: float, unit: Unit) -> float:
+    """The shortest number in the file's unit that is read back as exactly this value, if there is one."""
+    quotient = value / unit.si
+    below, above = math.nextafter(quotient, -math.inf), math.nextafter(quotient, math.inf)
+    near = [float(f"{quotient:.15g}"), float(f"{quotient:.16g}"), quotient, below, above]
+    near += [math.nextafter(below, -math.inf), math.nextafter(above, math.inf)]
+    return next((number for number in near if number * unit.si == value), quotient)

@@ -1,0 +1,74 @@
+"""A table of a settings file, read off a dataclass: a field's annotation gives its key, unit and bounds."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
+from functools import cache
+from types import EllipsisType, NoneType, UnionType
+from typing import Annotated, Union, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt
+
+from autopilot.quantities import Unit, Unlimited
+from harness.settings.number import in_file
+
+_PLAIN = Unit("", 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """A table of a file: its keys, and what is made of their values, given by field name."""
+
+    settings: Mapping[str, "Setting"]
+    make: Callable[..., object]
+    open: bool = False  # to keys that it does not know
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A field of a dataclass, as a file has it."""
+
+    kind: object  # float, str, a Literal…; of each element when there is a length
+    name: str = ""
+    unit: Unit = _PLAIN
+    bounds: tuple[Gt | Ge | Lt | Le, ...] = ()  # in file units
+    length: int | EllipsisType | None = None  # of a list; `...` for any
+    table: Table | None = None  # it is a table, or a list of such
+    optional: bool = False  # None is a value
+    required: bool = True
+    infinite: bool = False  # infinity is a value
+
+
+def _read(part: type) -> Table:
+    hints = get_type_hints(part, include_extras=True)
+    settings = {}
+    for f in fields(part):
+        required = f.default is MISSING and f.default_factory is MISSING
+        setting = replace(_annotated(hints[f.name]), name=f.name, required=required)
+        key = f"{f.name.rstrip('_')}_{setting.unit.suffix}".rstrip("_")
+        settings[key] = setting
+    return Table(settings, part)
+
+
+table_of: Callable[[type], Table] = cache(_read)  # no decorator: to mypy a class is not hashable
+
+
+def _annotated(hint: object) -> Setting:
+    """What an annotation says of a setting."""
+    if get_origin(hint) is Annotated:
+        inner, *marks = get_args(hint)
+        setting = _annotated(inner)
+        unit = next((mark for mark in marks if isinstance(mark, Unit)), setting.unit)
+        bounds = (
+            type(mark)(in_file(getattr(mark, type(mark).__name__.lower()), unit))
+            for mark in marks
+            if isinstance(mark, Gt | Ge | Lt | Le)
+        )
+        infinite = setting.infinite or Unlimited() in marks
+        return replace(setting, unit=unit, bounds=(*setting.bounds, *bounds), infinite=infinite)
+    if get_origin(hint) in (Union, UnionType):
+        (inner,) = (member for member in get_args(hint) if member is not NoneType)
+        return replace(_annotated(inner), optional=True)
+    if get_origin(hint) is tuple:
+        element, *others = get_args(hint)
+        return replace(_annotated(element), length=... if others == [...] else 1 + len(others))
+    return Setting(hint, table=table_of(hint) if isinstance(hint, type) and is_dataclass(hint) else None)

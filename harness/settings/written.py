@@ -1,0 +1,29 @@
+"""A flight written as a file has it."""
+
+import math
+from typing import Any
+
+from autopilot.laws import LAWS
+from harness.flight import Flight
+from harness.settings.number import in_file
+from harness.settings.table import Setting, table_of
+
+
+def document(flight: Flight) -> dict[str, Any]:
+    """The flight as a [flight] table in file units: every key, fit for JSON. `flight_from_document` undoes it."""
+    name = next(name for name, kind in LAWS.items() if kind.value is type(flight.law))
+    return {**_written(flight), "law": {"name": name, **_written(flight.law)}}
+
+
+def _written(part: object) -> dict[str, Any]:
+    return {key: _written_value(getattr(part, s.name), s) for key, s in table_of(type(part)).settings.items()}
+
+
+def _written_value(value: object, setting: Setting) -> object:
+    if isinstance(value, tuple):
+        return [_written_value(element, setting) for element in value]
+    if setting.table:
+        return _written(value)
+    if isinstance(value, float):
+        return "inf" if math.isinf(value) else in_file(value, setting.unit)
+    return value
