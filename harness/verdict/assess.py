@@ -1,0 +1,59 @@
+"""The thresholds and margins of the verdict, the table [assess] of a file; each with where its default comes from.
+
+Sources: *Part 60*: 14 CFR Part 60, Appendices C and D, how closely a flight simulator must follow the aircraft it
+stands for. *ACS*: FAA-S-ACS-6, what a pilot's steep turn at 45 deg of bank is allowed. *Delay*: x' = -k x(t - tau)
+swings through zero as soon as k tau > 1/e, and grows beyond pi/2. *Ours*: a choice, with its reason.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Lt
+
+from autopilot.quantities import About, Degrees, Metres, Seconds, Unit
+
+DegreesPerSecond2 = Annotated[float, Unit("deg_s2", math.pi / 180.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assess:
+    """What counts as holding. Relative ones and shares are numbers; the rest in SI, rad."""
+
+    airspeed_deviation: Annotated[
+        float, Gt(0), About("rms over nominal airspeed. Ours: 5 % of airspeed is 5 % of turn rate at the same bank")
+    ] = 0.05
+    heading_rate_gain: Annotated[
+        float, Gt(0), About("|flown over commanded - 1|. Ours: the 5 % asked of an identified inner loop")
+    ] = 0.05
+    heading_rate_lag: Annotated[Seconds, Gt(0), About("delay of the turn. The paper's sampling time (Table 1)")] = 0.5
+    lag_times_k2: Annotated[float, Gt(0), About("lag times reaching gain k2. Delay: 1/e, no oscillation below")] = (
+        1.0 / math.e
+    )
+    sideslip: Annotated[Degrees, Gt(0), About("rms. Part 60, adverse yaw: 2 deg of sideslip")] = math.radians(2.0)
+    altitude_deviation: Annotated[Metres, Gt(0), About("peak. ACS: 100 ft, to the metre below")] = 30.0
+    turn_ratio: Annotated[
+        float, Gt(0), About("|flown turn over g tan(bank)/V - 1|. Ours: 5 %, as for the heading-rate gain")
+    ] = 0.05
+    bank_reserve: Annotated[
+        Degrees, Ge(0), About("bank limit minus bank at the rate limit. Ours: what the inner loops keep at 45 deg")
+    ] = math.radians(5.0)
+    lost_share: Annotated[
+        float, Ge(0), Lt(1), About("of flights that end early. Ours: the holds are asked to bring 95 % through")
+    ] = 0.05
+    convergence_share_margin: Annotated[
+        float, Ge(0), Lt(1), About("of the shares that converge. Ours: as for lost flights")
+    ] = 0.05
+    convergence_time_margin: Annotated[
+        float, Gt(0), About("relative to the baseline's mean. Part 60: 10 %, its widest tolerance of a response")
+    ] = 0.10
+    range_error_margin: Annotated[
+        Metres, Gt(0), About("rms over the last half. Ours: 1 % of the standoff distance")
+    ] = 2.0
+    saturation_margin: Annotated[
+        float, Gt(0), About("share of the last half at the limit. Ours: a twentieth of the time")
+    ] = 0.05
+    command_activity_margin: Annotated[
+        DegreesPerSecond2, Gt(0), About("Ours: the paper's 5 deg/s reached and left again once in 10 s")
+    ] = math.radians(1.0)
+    significance: Annotated[float, Gt(0), Lt(0.5), About("of the tests, Holm's over all of a scorecard")] = 0.05
