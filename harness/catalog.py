@@ -5,12 +5,16 @@ from typing import get_args, get_type_hints
 
 import aircraft
 from autopilot.laws import LAWS
+from autopilot.quantities import About
 from harness.flight import Flight
 from harness.metrics import MEANING
+from harness.settings.table import table_of
+from harness.settings.written import written
+from harness.verdict.assess import Assess
 
 
 def lines(kind: str) -> Iterator[str]:
-    """The lines of one kind: laws, aircraft, plants or metrics."""
+    """The lines of one kind: laws, aircraft, plants, metrics or margins."""
     match kind:
         case "laws":
             for name, law in LAWS.items():
@@ -27,3 +31,11 @@ def lines(kind: str) -> Iterator[str]:
         case "metrics":
             for name, meaning in MEANING.items():
                 yield f"{name:30} {meaning}"
+        case "margins":
+            for key, value in written(Assess()).items():
+                yield f"{f'assess.{key} = {value:.4g}':50} {_about(key)}"
+
+
+def _about(key: str) -> str:
+    hint = get_type_hints(Assess, include_extras=True)[table_of(Assess).settings[key].name]
+    return next(mark.text for mark in get_args(hint) if isinstance(mark, About))

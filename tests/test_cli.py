@@ -167,7 +167,7 @@ def test_the_doctor_finds_this_installation_sound() -> None:
     assert "BAD" not in done.stdout
 
 
-@pytest.mark.parametrize("kind", ["laws", "aircraft", "plants", "metrics"])
+@pytest.mark.parametrize("kind", ["laws", "aircraft", "plants", "metrics", "margins"])
 def test_every_kind_is_listed(kind: str) -> None:
     done = harness("list", kind)
     assert done.returncode == 0

@@ -4,7 +4,7 @@ import click
 
 
 @click.command("list")
-@click.argument("kind", type=click.Choice(["laws", "aircraft", "plants", "metrics"]))
+@click.argument("kind", type=click.Choice(["laws", "aircraft", "plants", "metrics", "margins"]))
 def list_(kind: str) -> None:
     """What there is of a KIND, a line each.
 

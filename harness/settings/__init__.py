@@ -1,7 +1,7 @@
 """Settings: the border between a TOML file (keys with unit suffixes, degrees) and a flight (SI, radians)."""
 
 from harness.settings.experiment import Experiment
-from harness.settings.file import SettingsFile, flight_from_document, load_flight, read_settings
+from harness.settings.file import SettingsFile, flight_from_document, load_flight, read_settings, settings_from_text
 from harness.settings.keys import file_key, put
 from harness.settings.mistake import SettingsError
 from harness.settings.written import document
@@ -16,4 +16,5 @@ __all__ = [
     "load_flight",
     "put",
     "read_settings",
+    "settings_from_text",
 ]

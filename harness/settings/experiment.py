@@ -13,6 +13,7 @@ from autopilot.laws import LAWS
 from autopilot.quantities import About
 from harness.flight import Flight
 from harness.settings.table import Setting, Table, table_of
+from harness.verdict.assess import Assess
 
 CUSTOM = "custom"  # in the place of a named set: every gain is given
 
@@ -27,7 +28,7 @@ class Experiment:
     matrix: Annotated[Mapping[str, object], About("every key an axis, with its values")] = field(default_factory=dict)
     exclude: Annotated[tuple[Mapping[str, object], ...], About("flights to leave out")] = ()
     include: Annotated[tuple[Mapping[str, object], ...], About("flights to add")] = ()
-    assess: Annotated[Mapping[str, object], About("margins of the verdict")] = field(default_factory=dict)
+    assess: Annotated[Assess, About("margins and thresholds of the verdict")] = field(default_factory=Assess)
 
 
 @cache

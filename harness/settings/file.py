@@ -13,8 +13,9 @@ from harness.settings.check import checked
 from harness.settings.experiment import CUSTOM, Experiment, document_table
 from harness.settings.keys import file_key, put
 from harness.settings.mistake import Mistake, Place, Places, SettingsError, settings_error
-from harness.settings.table import table_of
+from harness.settings.table import Table, table_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
+from harness.verdict.assess import Assess
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,15 @@ class SettingsFile:
         assert isinstance(experiment, Experiment)
         return experiment
 
+    def assess(self) -> Assess:
+        """The margins of the verdict alone, whatever else the file says. Raises `SettingsError`."""
+        only = Table({"assess": table_of(Experiment).settings["assess"]}, dict, open=True)
+        made = checked(only, self.document, self._place)
+        assert isinstance(made, dict)
+        assess = made.get("assess", Assess())
+        assert isinstance(assess, Assess)
+        return assess
+
     def locate(self, name: str) -> str:
         """Where a field is set, by its dotted name: `FILE:LINE: flight.start.airspeed_mps` for `start.airspeed`."""
         key = file_key(name)
@@ -62,7 +72,11 @@ def load_flight(path: Path, overrides: Sequence[str] = ()) -> Flight:
 
 def read_settings(path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
     """A file with `overrides` merged into its [flight]. Raises `SettingsError` for a text that is no TOML."""
-    text = _text(path)
+    return settings_from_text(_text(path), path, overrides)
+
+
+def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
+    """The same of a file's text, as a store keeps it."""
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -28,12 +28,12 @@ def file_key(name: str) -> Key:
 def put(document: dict[str, Any], name: str, value: object) -> Key:
     """Sets a value in the document's [flight] by the key's dotted name, as in `law.gains`, and gives its whole key.
 
-    Raises `SettingsError` for what cannot be a key.
+    A name that begins with `assess.` is one of the table [assess]. Raises `SettingsError` for what cannot be a key.
     """
     words = [word.strip() for word in name.strip().removeprefix("flight.").split(".")]
     if not all(words):
         raise SettingsError(["the key must be a dotted name below [flight], as in law.gains"])
-    key = ("flight", *words)
+    key = tuple(words) if words[0] == "assess" else ("flight", *words)
     table = document
     for i, word in enumerate(key[:-1]):
         table = table.setdefault(word, {})

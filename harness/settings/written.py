@@ -12,10 +12,11 @@ from harness.settings.table import Setting, table_of
 def document(flight: Flight) -> dict[str, Any]:
     """The flight as a [flight] table in file units: every key, fit for JSON. `flight_from_document` undoes it."""
     name = next(name for name, kind in LAWS.items() if kind.value is type(flight.law))
-    return {**_written(flight), "law": {"name": name, **_written(flight.law)}}
+    return {**written(flight), "law": {"name": name, **written(flight.law)}}
 
 
-def _written(part: object) -> dict[str, Any]:
+def written(part: object) -> dict[str, Any]:
+    """A dataclass as a table in file units."""
     return {key: _written_value(getattr(part, s.name), s) for key, s in table_of(type(part)).settings.items()}
 
 
@@ -23,7 +24,7 @@ def _written_value(value: object, setting: Setting) -> object:
     if isinstance(value, tuple):
         return [_written_value(element, setting) for element in value]
     if setting.table:
-        return _written(value)
+        return written(value)
     if isinstance(value, float):
         return "inf" if math.isinf(value) else in_file(value, setting.unit)
     return value

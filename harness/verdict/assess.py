@@ -36,7 +36,7 @@ class Assess:
         float, Gt(0), About("|flown turn over g tan(bank)/V - 1|. Ours: 5 %, as for the heading-rate gain")
     ] = 0.05
     bank_reserve: Annotated[
-        Degrees, Ge(0), About("bank limit minus bank at the rate limit. Ours: what the inner loops keep at 45 deg")
+        Degrees, Ge(0), About("bank limit minus bank at the rate limit. Ours: room to correct, as 50 deg leaves for 45")
     ] = math.radians(5.0)
     lost_share: Annotated[
         float, Ge(0), Lt(1), About("of flights that end early. Ours: the holds are asked to bring 95 % through")
