@@ -14,7 +14,7 @@ from functools import partial
 
 import aircraft
 from autopilot.laws import law
-from harness.flight import Flight
+from harness.flight import Flight, air_of
 from harness.flight_log import COLUMNS
 from harness.plants.sixdof import SixDof, engage, load, trim
 from harness.simulation import simulate
@@ -32,7 +32,7 @@ def seconds(work: Callable[[], object]) -> float:
 def bare_loop(flight: Flight) -> float:
     """Processor time of the flight's steps with nothing but JSBSim in the loop."""
     fdm = load(aircraft.folder(flight.aircraft), flight.step)
-    engage(fdm, trim(fdm, flight.start, flight.wind), flight.start, rate_trim=True)
+    engage(fdm, trim(fdm, flight.start, air_of(flight)), flight.start, rate_trim=True)
     steps = round(flight.duration / flight.step)
 
     def run() -> None:
@@ -61,7 +61,7 @@ def main(pairs: int) -> None:
         ratios = [f / b for f, b in zip(flown, bare, strict=True)]
         print(f"{name}: 900 s flight / bare loop {spread(ratios)}; flight {spread(flown)} s")
         plant = SixDof(aircraft.folder(name), flight.step, rate_trim=True)
-        built = [seconds(partial(plant.start, flight.start, flight.wind)) for _ in range(20)]
+        built = [seconds(partial(plant.start, flight.start, air_of(flight))) for _ in range(20)]
         print(f"{name}: build, load and trim {spread(built[1:], 1e3)} ms after the first ({1e3 * built[0]:.1f} ms)")
     simulate(kinematic)
     print(

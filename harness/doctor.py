@@ -6,9 +6,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import NamedTuple
 
 import aircraft
+from harness.air import Air
 from harness.plant import Start
 from harness.plants.sixdof import compare_units, wind_triangle_error
-from harness.wind import Wind
 
 PACKAGES = ("standoff-harness", "jsbsim", "numpy", "filterpy", "pandas", "pydantic", "rerun-sdk")
 WIND_TOLERANCE = 1e-6  # m/s
@@ -35,9 +35,7 @@ def examine() -> Iterator[Finding]:
         airframe = aircraft.folder(name)
         speed = float(aircraft.data(airframe)["envelope"]["V_design"]["v"])
         start = Start(airspeed=speed, heading=1.0)
-        error = max(
-            wind_triangle_error(airframe, start, Wind(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0))
-        )
+        error = max(wind_triangle_error(airframe, start, Air(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0)))
         yield Finding(f"wind, {name}", f"v_ground - v_air - wind: {error:.1e} m/s", error < WIND_TOLERANCE)
         units = compare_units(airframe)
         what, error = max(((u.what, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])

@@ -12,6 +12,7 @@ import aircraft
 from autopilot.estimator import Estimator
 from autopilot.guidance import Law
 from autopilot.quantities import About, Metres, Seconds
+from harness.air import Air
 from harness.plant import Plant, Start
 from harness.plants.kinematic import Kinematic
 from harness.target import Target, TargetState
@@ -76,6 +77,11 @@ def plant_of(flight: Flight) -> Plant:
     return SixDof(aircraft.folder(flight.aircraft), flight.step, flight.inner_loop.rate_trim)
 
 
+def air_of(flight: Flight) -> Air:
+    """The air that the flight meets: the same for every plant, law and guidance period."""
+    return flight.wind.start(flight.start.altitude, flight.step, flight.duration)
+
+
 def problems(flight: Flight) -> list[Problem]:
     """What makes the flight impossible as it is set, beyond what each field says of itself; empty when it can start."""
     found = []
@@ -98,6 +104,11 @@ def problems(flight: Flight) -> list[Problem]:
         found.append(
             Problem("wind.steady", f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s")
         )
+    found += [
+        Problem(f"wind.gusts.{i}.to", f"{gust.to:g} s, must be after from_s, {gust.from_:g} s")
+        for i, gust in enumerate(flight.wind.gusts)
+        if gust.to <= gust.from_
+    ]
     found += _target_problems(flight)
     try:
         aircraft.folder(flight.aircraft)

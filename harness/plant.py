@@ -8,8 +8,8 @@ from typing import Annotated, Protocol
 from annotated_types import Gt
 
 from autopilot.quantities import About, Degrees, Metres, MetresPerSecond
+from harness.air import Air
 from harness.state import State
-from harness.wind import Wind
 
 
 class Outcome(StrEnum):
@@ -68,6 +68,6 @@ class Flying(Protocol):
 class Plant(Protocol):
     """A model of the aircraft with its inner loop: a frozen value."""
 
-    def start(self, start: Start, wind: Wind) -> Flying:
-        """The aircraft at `start` in this wind. Raises `PlantError` when it cannot fly so."""
+    def start(self, start: Start, air: Air) -> Flying:
+        """The aircraft at `start` in this air. Raises `PlantError` when it cannot fly so."""
         ...

@@ -7,7 +7,7 @@ import numpy as np
 
 from autopilot.guidance import Guidance, Observation, Step
 from harness.estimation import Estimation
-from harness.flight import Flight, plant_of, problems
+from harness.flight import Flight, air_of, plant_of, problems
 from harness.flight_log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
 from harness.plant import End, Outcome
 from harness.state import State
@@ -23,7 +23,7 @@ def simulate(flight: Flight) -> FlightLog:
         raise ValueError(f"{problem.name}: {problem.message}")
     target, law = flight.target.start(), flight.law.start()
     estimation = Estimation(flight, target) if flight.estimator.kind == "ekf" else None
-    flying = plant_of(flight).start(flight.start, flight.wind)
+    flying = plant_of(flight).start(flight.start, air_of(flight))
     period, last = flight.guidance_period, flight.periods
     wind, nominal_airspeed = flight.wind.steady, flight.start.airspeed
     monitoring_range = flight.metrics.monitoring_range

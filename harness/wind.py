@@ -1,9 +1,29 @@
-"""The air: where it moves to."""
+"""The wind of a flight as it is set."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from autopilot.quantities import About, MetresPerSecond
+import numpy as np
+from annotated_types import Ge, Le
+
+from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre, Seconds
+from harness.air import Air, Array
+
+_Gusty = Annotated[MetresPerSecond, Ge(-100), Le(100)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gust:
+    """A discrete gust: it swells and dies away as (1 - cos)/2."""
+
+    from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
+    to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
+    velocity: Annotated[tuple[_Gusty, _Gusty, _Gusty], About("at its height: the air moves towards north, east, down")]
+
+    def at(self, time: Array) -> Array:
+        """The gust at these times, s; (times, 3), m/s."""
+        share = np.clip((time - self.from_) / (self.to - self.from_), 0.0, 1.0)
+        return np.outer(0.5 - 0.5 * np.cos(2.0 * np.pi * share), self.velocity)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,4 +33,17 @@ class Wind:
     steady: Annotated[
         tuple[MetresPerSecond, MetresPerSecond], About("steady wind: the air moves towards north, east")
     ] = (0.0, 0.0)
+    shear: Annotated[
+        tuple[MetresPerSecondPerMetre, MetresPerSecondPerMetre],
+        About("what a metre above the start's altitude adds to the steady wind"),
+    ] = (0.0, 0.0)
+    gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; where they overlap, they add up")] = ()
     turbulence: Annotated[Literal["none"], About("severity of the turbulence")] = "none"
+
+    def start(self, altitude: float, step: float, duration: float) -> Air:
+        """The air of a flight that starts at `altitude` (m), on its grid of steps (s)."""
+        if self == Wind(steady=self.steady):
+            return Air(steady=self.steady)
+        time = step * np.arange(round(duration / step) + 1, dtype=np.float64)
+        gusts = sum((gust.at(time) for gust in self.gusts), np.zeros((len(time), 3)))
+        return Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)

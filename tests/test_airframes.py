@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 import aircraft
 from aircraft.write_models import jsbsim_model
+from harness.air import Air
 from harness.plant import Start
 from harness.plants.sixdof import FT, SLUG, NoTrimError, engage, load, trim
-from harness.wind import Wind
 
 LBF = 4.4482216152605  # N
 AIRFRAMES = aircraft.names()
@@ -166,7 +166,7 @@ def test_mass_and_inertia_are_those_of_the_data(name: str) -> None:
 def test_trimmed_flight_has_no_acceleration_once_the_actuators_run(name: str, wind: tuple[float, float]) -> None:
     fdm = load(aircraft.folder(name), STEP)
     start = design_start(name)
-    trimmed = trim(fdm, start, Wind(steady=wind))
+    trimmed = trim(fdm, start, Air(steady=wind))
     engage(fdm, trimmed, start, rate_trim=True)
     for _ in range(400):  # 2 s: several times the slowest actuator's lag
         fdm.run()
@@ -201,7 +201,7 @@ def test_every_number_of_an_airframe_has_a_source(name: str) -> None:
 )
 def test_an_airspeed_beyond_the_airframe_is_refused(name: str, airspeed: float) -> None:
     with pytest.raises(NoTrimError):
-        trim(load(aircraft.folder(name), STEP), Start(airspeed=airspeed), Wind())
+        trim(load(aircraft.folder(name), STEP), Start(airspeed=airspeed), Air())
 
 
 def test_a_folder_laid_out_alike_is_an_airframe(tmp_path: Path) -> None:
@@ -211,4 +211,4 @@ def test_a_folder_laid_out_alike_is_an_airframe(tmp_path: Path) -> None:
     (mine / "airframe.toml").write_bytes((given / "airframe.toml").read_bytes())
     (mine / "inner_loop.toml").write_bytes((given / "inner_loop.toml").read_bytes())
     (mine / "mine.xml").write_text(jsbsim_model(mine), encoding="utf-8")
-    assert trim(load(aircraft.folder(str(mine)), STEP), design_start("skywalker_x8"), Wind()).throttle > 0
+    assert trim(load(aircraft.folder(str(mine)), STEP), design_start("skywalker_x8"), Air()).throttle > 0

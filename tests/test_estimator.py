@@ -16,7 +16,7 @@ from autopilot.estimator import Estimator, Measurement, Tracker, initial, linear
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.laws import law
 from harness.estimation import Estimation, sensor
-from harness.flight import Flight, MetricSettings, plant_of, problems
+from harness.flight import Flight, MetricSettings, air_of, plant_of, problems
 from harness.flight_log import COLUMNS, FlightLog
 from harness.paper.consistency import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
 from harness.plant import Outcome
@@ -231,7 +231,8 @@ def test_with_the_truth_the_law_sees_the_target_as_it_is(plant: str) -> None:
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
 def test_a_flight_with_the_truth_is_law_and_plant_alone_to_the_last_bit(plant: str) -> None:
     one = flight(plant, estimator=Estimator())
-    log, flying, step, target = simulate(one), plant_of(one).start(one.start, one.wind), one.law.start(), MOVING.start()
+    log, step, target = simulate(one), one.law.start(), MOVING.start()
+    flying = plant_of(one).start(one.start, air_of(one))
     for k in range(one.periods):
         guidance = command(step, observe(flying.state, one.start.airspeed, one.wind.steady, target(k * 0.05)))
         assert guidance.heading_rate == log["heading_rate_command"][k]

@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 
 from autopilot.laws import law
+from harness.air import Air
 from harness.flight import Flight, feasibility_margin, needed_heading_rate, problems, warnings
 from harness.plant import Start
 from harness.plants.kinematic import Kinematic
@@ -84,4 +85,4 @@ def test_an_airspeed_outside_the_envelope_is_a_warning() -> None:
 
 
 def test_a_kinematic_start_needs_no_height() -> None:
-    assert Kinematic().start(Start(altitude=0.0), Wind()).state.altitude == 0.0
+    assert Kinematic().start(Start(altitude=0.0), Air()).state.altitude == 0.0

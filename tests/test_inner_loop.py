@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import aircraft
+from harness.air import Air
 from harness.plant import Start
 from harness.plants.sixdof import SixDof
 from harness.state import State
-from harness.wind import Wind
 
 AIRFRAMES = aircraft.names()
 STEP = 0.005
@@ -24,7 +24,7 @@ def flown(
     """A flight from trim with this heading-rate command from the first moment on, a row per step."""
     airframe = aircraft.folder(name)
     start = Start(airspeed=float(aircraft.data(airframe)["envelope"]["V_design"]["v"]), heading=0.4)
-    flying = SixDof(airframe, STEP, rate_trim).start(start, Wind(steady=wind))
+    flying = SixDof(airframe, STEP, rate_trim).start(start, Air(steady=wind))
     states = [flying.state]
     for _ in range(round(duration / STEP)):
         flying.advance(rate, STEP)
@@ -76,7 +76,7 @@ def test_the_command_is_limited_at_the_bank_limit_and_unwinds_at_once(name: str)
     """Direction-aware anti-windup: after 10 s of an unreachable command the way back starts as from any turn."""
     airframe = aircraft.folder(name)
     start = Start(airspeed=float(aircraft.data(airframe)["envelope"]["V_design"]["v"]))
-    flying = SixDof(airframe, STEP, True).start(start, Wind())
+    flying = SixDof(airframe, STEP, True).start(start, Air())
     for _ in range(2000):
         flying.advance(math.radians(60.0), STEP)
     assert flying.state.bank_command == pytest.approx(aircraft.bank_limit(airframe))

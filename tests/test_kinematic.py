@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from harness.air import Air
 from harness.plant import Start
 from harness.plants.kinematic import Kinematic
-from harness.wind import Wind
 
 START = Start(position=(5.0, -7.0), heading=0.3, airspeed=13.0)
-WIND = Wind(steady=(1.5, -2.5))
+WIND = Air(steady=(1.5, -2.5))
 RATES = st.floats(-0.6, 0.6)
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import aircraft
 from autopilot.laws import law
+from harness.air import Air
 from harness.flight import Flight
 from harness.plant import End, Outcome, PlantError, Start
 from harness.plants.sixdof import ModelError, SixDof, load, wind_triangle_error, write
@@ -33,7 +34,7 @@ def flight(**changes: object) -> Flight:
 def test_ground_velocity_is_air_velocity_plus_wind(name: str) -> None:
     speed = float(aircraft.data(aircraft.folder(name))["envelope"]["V_design"]["v"])
     start = Start(airspeed=speed, heading=2.0)
-    assert wind_triangle_error(aircraft.folder(name), start, Wind(steady=(-3.0, 4.0))) < 1e-6
+    assert wind_triangle_error(aircraft.folder(name), start, Air(steady=(-3.0, 4.0))) < 1e-6
 
 
 def test_position_is_the_integral_of_ground_velocity() -> None:
@@ -45,7 +46,7 @@ def test_position_is_the_integral_of_ground_velocity() -> None:
 
 
 def test_the_wind_a_flight_meets_is_the_one_it_is_given() -> None:
-    flying = SixDof(STICK, STEP, True).start(Start(heading=1.0), Wind(steady=(3.0, -2.0)))
+    flying = SixDof(STICK, STEP, True).start(Start(heading=1.0), Air(steady=(3.0, -2.0)))
     flying.advance(0.0, 1.0)
     state = flying.state
     air = (state.velocity_north - 3.0, state.velocity_east + 2.0)
@@ -94,7 +95,7 @@ def test_a_mirrored_flight_mirrors_the_flight(plant: str, tolerance: float) -> N
 
 
 def test_a_flight_into_the_ground_ends_as_ground() -> None:
-    flying = SixDof(STICK, STEP, True).start(Start(altitude=30.0), Wind())
+    flying = SixDof(STICK, STEP, True).start(Start(altitude=30.0), Air())
     flying._run.__self__["inner-loop/command/altitude-m"] = -100.0
     with pytest.raises(End) as end:
         for _ in range(2000):
@@ -103,7 +104,7 @@ def test_a_flight_into_the_ground_ends_as_ground() -> None:
 
 
 def test_a_number_that_is_not_finite_ends_the_flight_as_invalid() -> None:
-    flying = SixDof(STICK, STEP, True).start(Start(), Wind())
+    flying = SixDof(STICK, STEP, True).start(Start(), Air())
     with pytest.raises(End) as end:
         for _ in range(10):
             flying.advance(math.nan, 0.05)
@@ -111,7 +112,7 @@ def test_a_number_that_is_not_finite_ends_the_flight_as_invalid() -> None:
 
 
 def test_a_roll_beyond_80_degrees_ends_as_departed() -> None:
-    flying = SixDof(STICK, STEP, True).start(Start(), Wind())
+    flying = SixDof(STICK, STEP, True).start(Start(), Air())
     fdm = flying._run.__self__
     fdm["inner-loop/gain/bank-p"] = -0.9  # a bank loop with its sign turned round
     with pytest.raises(End) as end:
@@ -144,7 +145,7 @@ def test_a_model_that_jsbsim_cannot_read_whole_is_refused(tmp_path: Path, broken
     assert broken in text
     (airframe / "broken.xml").write_text(text.replace(broken, with_, 1), encoding="utf-8")
     with pytest.raises(ModelError, match=r"broken\.xml"):
-        SixDof(airframe, STEP, True).start(Start(), Wind())
+        SixDof(airframe, STEP, True).start(Start(), Air())
 
 
 def test_a_property_that_nobody_made_cannot_be_written() -> None:
@@ -154,9 +155,9 @@ def test_a_property_that_nobody_made_cannot_be_written() -> None:
 
 def test_a_start_near_the_ground_is_refused() -> None:
     with pytest.raises(PlantError, match="15 m"):
-        SixDof(STICK, STEP, True).start(Start(altitude=15.0), Wind())
+        SixDof(STICK, STEP, True).start(Start(altitude=15.0), Air())
 
 
 def test_an_airspeed_without_trim_is_refused_with_what_is_allowed() -> None:
     with pytest.raises(PlantError, match=r"no level trim at 7 m/s.* from 11\.5 to 25 m/s"):
-        SixDof(STICK, STEP, True).start(Start(airspeed=7.0), Wind())
+        SixDof(STICK, STEP, True).start(Start(airspeed=7.0), Air())

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -15,9 +16,9 @@ from numpy.typing import NDArray
 import aircraft
 import autopilot
 from autopilot.angles import wrap
-from harness.plant import End, Flying, Outcome, PlantError, Start
+from harness.air import Air, Vector
+from harness.plant import End, Outcome, PlantError, Start
 from harness.state import State
-from harness.wind import Wind
 
 FT = 0.3048  # m
 SLUG = 4.4482216152605 / FT  # kg
@@ -104,7 +105,6 @@ def _node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
     return node
 
 
-Vector = tuple[float, float, float]
 _NUDGE = 1e-5  # rad, or of the throttle
 
 
@@ -116,13 +116,13 @@ class Trim(NamedTuple):
     throttle: float
 
 
-def trim(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> Trim:
-    """Puts the aircraft at `start`, level and unaccelerated, and gives the trim that does it.
+def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
+    """Puts the aircraft at `start`, level and unaccelerated in the steady wind, and gives the trim that does it.
 
     Newton's method on the accelerations that JSBSim reports, with the surfaces placed directly: their actuators do not
     run before engagement, so no lag falsifies the result. Raises `NoTrimError` where there is none.
     """
-    _place(fdm, start, wind)
+    _place(fdm, start, air.steady)
     x = Trim(pitch=0.05, elevator=0.0, throttle=0.5)
     for _ in range(30):
         residual = _accelerations(fdm, x)
@@ -158,12 +158,12 @@ def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: Wind) -> None:
+def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: tuple[float, float]) -> None:
     """The initial condition in the order that JSBSim needs: attitude, wind, then velocity over the ground.
 
     The start lies on the equator, where the local north turns least along the way.
     """
-    W_x, W_y = wind.steady
+    W_x, W_y = wind
     write(fdm, "ic/lat-geod-rad", 0.0)
     write(fdm, "ic/long-gc-rad", 0.0)
     write(fdm, "ic/h-sl-ft", start.altitude / FT)
@@ -231,6 +231,9 @@ _READ = (
     "fcs/elevator-pos-rad",
     "fcs/rudder-pos-rad",
     "actuators/throttle-norm",
+    "atmosphere/gust-north-fps",
+    "atmosphere/gust-east-fps",
+    "atmosphere/gust-down-fps",
 )
 
 
@@ -242,40 +245,81 @@ class SixDof:
     step: float
     rate_trim: bool
 
-    def start(self, start: Start, wind: Wind) -> Flying:
+    def start(self, start: Start, air: Air) -> "_SixDofFlying":
         if not start.altitude > GROUND:
             raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
         data = aircraft.data(self.airframe)
         stall, envelope = data["aero"]["alpha_stall"]["v"], data["envelope"]
         fdm = load(self.airframe, self.step)
         try:
-            trimmed = trim(fdm, start, wind)
+            trimmed = trim(fdm, start, air)
         except NoTrimError as error:
             slowest, fastest = envelope["V_min"]["v"], envelope["V_max"]["v"]
             allowed = f"{self.airframe.name} flies from {slowest:g} to {fastest:g} m/s"
             raise PlantError("start.airspeed", f"{error}; {allowed}") from None
+        blow = _blower(fdm, air) if len(air.gusts) else None
+        if blow:
+            blow()
+            fdm.run_ic()  # trimmed for the steady wind, the aircraft is met by the first gust
         engage(fdm, trimmed, start, self.rate_trim)
-        return _SixDofFlying(fdm, self.step, start, wind, stall)
+        return _SixDofFlying(fdm, self.step, start, air, stall, blow)
+
+
+def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
+    """What puts the air's next gust into JSBSim: that at the end of the step that `run()` then makes."""
+    north, east, down = (
+        _node(fdm, f"atmosphere/gust-{axis}-fps").set_double_value for axis in ("north", "east", "down")
+    )
+    height = _node(fdm, "position/h-sl-ft").get_double_value
+    shear_north, shear_east = air.shear
+    level = air.altitude / FT
+    rows = chain.from_iterable((air.gusts[k : k + 1000] / FT).tolist() for k in range(0, len(air.gusts), 1000))
+
+    def blow() -> None:
+        above = height() - level
+        W_x, W_y, W_z = next(rows)
+        north(W_x + shear_north * above)
+        east(W_y + shear_east * above)
+        down(W_z)
+
+    return blow
 
 
 class _SixDofFlying:
-    def __init__(self, fdm: jsbsim.FGFDMExec, step: float, start: Start, wind: Wind, stall: float) -> None:
+    def __init__(
+        self,
+        fdm: jsbsim.FGFDMExec,
+        step: float,
+        start: Start,
+        air: Air,
+        stall: float,
+        blow: Callable[[], None] | None,
+    ) -> None:
+        self.fdm = fdm
         self._run: Callable[[], bool] = fdm.run
+        self._blow = blow
         self._readers = [_node(fdm, name).get_double_value for name in _READ]
         self._velocity_north, self._velocity_east = self._readers[2:4]
         self._command = _node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
         self._step = step
         self._north, self._east = start.position
-        self._wind = wind.steady
+        self._wind = air.steady
         self._stall, self._stalled_for = stall, 0.0
         self.state = self._read(self._heading())
 
     def advance(self, heading_rate: float, period: float) -> None:
         self._command(heading_rate)
-        run = self._run
-        for _ in range(round(period / self._step) - 1):
-            run()
-        before = self._heading()
+        run, blow, steps = self._run, self._blow, round(period / self._step)
+        if blow is None:
+            for _ in range(steps - 1):
+                run()
+            before = self._heading()
+        else:
+            for _ in range(steps - 1):
+                blow()
+                run()
+            before = self._heading()
+            blow()
         run()
         self.state = state = self._read(before)
         if not (state.altitude > GROUND and abs(state.bank) < DEPARTURE_BANK and state.angle_of_attack < self._stall):
@@ -301,30 +345,31 @@ class _SixDofFlying:
 
     def _read(self, before: float) -> State:
         """The state now; `before` is the heading one step ago, which gives its rate (over that step)."""
-        n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z, *surfaces = [
+        n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z, *others = [
             get() for get in self._readers
         ]
+        *surfaces, gust_x, gust_y, gust_z = others
         W_x, W_y = self._wind
         heading = math.atan2(FT * v_e - W_y, FT * v_n - W_x)
         return State._make(
             (
                 self._north + FT * n, self._east + FT * e, FT * v_n, FT * v_e, FT * V,
                 heading, wrap(heading - before) / self._step, phi, p, FT * h, FT * v_d, theta, psi, q, r,
-                phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, W_x, W_y, 0.0,
+                phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, W_x + FT * gust_x, W_y + FT * gust_y, FT * gust_z,
             )
         )  # fmt: skip
 
 
-def wind_triangle_error(airframe: Path, start: Start, wind: Wind) -> float:
+def wind_triangle_error(airframe: Path, start: Start, air: Air) -> float:
     """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air from the body's axes."""
-    fdm = load(airframe, 0.005)
-    engage(fdm, trim(fdm, start, wind), start, rate_trim=True)
-    for _ in range(400):
-        fdm.run()
+    flying = SixDof(airframe, 0.005, True).start(start, air)
+    flying.advance(0.0, 2.0)
+    fdm, state = flying.fdm, flying.state
     phi, theta, psi = (fdm[f"attitude/{angle}-rad"] for angle in ("phi", "theta", "psi"))
-    air = _body_to_ned(phi, theta, psi) @ [fdm[f"velocities/{axis}-aero-fps"] for axis in "uvw"]
-    ground = [fdm[f"velocities/v-{axis}-fps"] for axis in ("north", "east", "down")]
-    return float(np.abs(FT * (np.array(ground) - air) - [*wind.steady, 0.0]).max())
+    through_air = _body_to_ned(phi, theta, psi) @ [FT * fdm[f"velocities/{axis}-aero-fps"] for axis in "uvw"]
+    over_ground = np.array((state.velocity_north, state.velocity_east, state.velocity_down))
+    wind = (state.wind_north, state.wind_east, state.wind_down)
+    return float(np.abs(over_ground - through_air - wind).max())
 
 
 def _body_to_ned(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
@@ -353,7 +398,7 @@ def compare_units(airframe: Path) -> list[UnitCheck]:
     mass, ref = data["mass"], data["ref"]
     fdm = load(airframe, 0.005)
     start = Start(airspeed=float(data["envelope"]["V_design"]["v"]))
-    trim(fdm, start, Wind())
+    trim(fdm, start, Air())
     return [
         UnitCheck(*row)
         for row in (
