@@ -1,10 +1,25 @@
 """Where the airframes are: one folder each, with a JSBSim model and the data it was written from."""
 
 import tomllib
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 FOLDER = Path(__file__).parent
+
+
+class AirframeError(ValueError):
+    """What is wrong with an airframe's files, in one line: `FILE: what`."""
+
+
+class Limits(NamedTuple):
+    """What an airframe bears. SI, rad."""
+
+    slowest: float
+    design_airspeed: float
+    fastest: float
+    stall: float  # angle of attack
+    bank: float  # the largest that its inner loop commands
 
 
 def names() -> list[str]:
@@ -26,15 +41,46 @@ def model(airframe: Path) -> Path:
 
 
 def data(airframe: Path) -> dict[str, Any]:
-    """An airframe's published data; SI, rad; each number with its source."""
-    return tomllib.loads((airframe / "airframe.toml").read_text(encoding="utf-8"))
+    """An airframe's published data; SI, rad; each number with its source. Raises `AirframeError`."""
+    return _read(airframe / "airframe.toml")
 
 
 def inner_loop(airframe: Path) -> dict[str, Any]:
-    """The gains and limits of an airframe's inner loop."""
-    return tomllib.loads((airframe / "inner_loop.toml").read_text(encoding="utf-8"))
+    """The gains and limits of an airframe's inner loop. Raises `AirframeError`."""
+    return _read(airframe / "inner_loop.toml")
 
 
-def bank_limit(airframe: Path) -> float:
-    """The largest bank that the inner loop commands, rad."""
-    return float(inner_loop(airframe)["limit"]["bank-rad"]["v"])
+def limits(airframe: Path) -> Limits:
+    """What the airframe bears. Raises `AirframeError` when its files do not say."""
+    published, loop = airframe / "airframe.toml", airframe / "inner_loop.toml"
+    return Limits(
+        slowest=_number(published, "envelope", "V_min"),
+        design_airspeed=_number(published, "envelope", "V_design"),
+        fastest=_number(published, "envelope", "V_max"),
+        stall=_number(published, "aero", "alpha_stall"),
+        bank=_number(loop, "limit", "bank-rad"),
+    )
+
+
+def _number(file: Path, *keys: str) -> float:
+    """The number `v` of an entry."""
+    value: Any = _read(file)
+    for key in (*keys, "v"):
+        value = value.get(key) if isinstance(value, dict) else None
+    if not isinstance(value, float | int):
+        raise AirframeError(f"{file}: {'.'.join(keys)}.v must be a number")
+    return float(value)
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        return _parsed(file, file.stat().st_mtime_ns)
+    except OSError as error:
+        raise AirframeError(f"{file}: {error.strerror}") from None
+    except ValueError as error:
+        raise AirframeError(f"{file}: no valid TOML: {error}") from None
+
+
+@lru_cache(maxsize=16)
+def _parsed(file: Path, modified: int) -> dict[str, Any]:
+    return tomllib.loads(file.read_text(encoding="utf-8"))

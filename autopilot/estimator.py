@@ -56,7 +56,7 @@ class Estimator:
     period: Annotated[Seconds, Gt(0), Le(1e3), About("of the measurements, T_s")] = 0.5
     sensor_position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (0.0, 0.0)
     range_variance: Annotated[SquareMetres, Gt(0), About("of the measurement noise, P")] = 0.5
-    azimuth_variance: Annotated[SquareRadians, Gt(0), About("of the measurement noise, P")] = 0.015
+    azimuth_variance: Annotated[SquareRadians, Gt(0), Le(10), About("of the measurement noise, P")] = 0.015
     process_position_variance: Annotated[SquareMetres, Ge(0), About("per axis and measurement period, Q")] = 0.2
     process_velocity_variance: Annotated[SquareMetresPerSecond, Ge(0), About("per axis and measurement period, Q")] = (
         0.01

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import asin, atan2, copysign, cos, hypot, pi, radians, sin, sqrt
 from typing import Annotated, Literal
 
-from annotated_types import Gt
+from annotated_types import Ge, Gt
 
 from autopilot.angles import wrap
 from autopilot.guidance import Guidance, Observation, Step
@@ -79,7 +79,7 @@ Reaching = Callable[[Motion], tuple[float, float, float]]  # feed-forward, rest 
 class StandoffLaw:
     """What every standoff law has: the circle, the limit, and how the command is given."""
 
-    standoff: Annotated[Metres, Gt(0), About("desired distance to the target, R_d")] = 200.0
+    standoff: Annotated[Metres, Ge(0.1), About("desired distance to the target, R_d")] = 200.0
     max_heading_rate: Annotated[DegreesPerSecond, Gt(0), Unlimited(), About("limit of the command, Eq. (2)")] = radians(
         5.0
     )

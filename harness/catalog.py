@@ -23,9 +23,9 @@ def lines(kind: str) -> Iterator[str]:
                     yield f"    {gains}: " + ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
         case "aircraft":
             for name in aircraft.names():
-                data = aircraft.data(aircraft.folder(name))
-                speed = data["envelope"]["V_design"]["v"]
-                yield f"{name}: {data['meta']['long_name']}, {data['meta']['layout']}; {speed:g} m/s"
+                airframe = aircraft.folder(name)
+                meta, speed = aircraft.data(airframe)["meta"], aircraft.limits(airframe).design_airspeed
+                yield f"{name}: {meta['long_name']}, {meta['layout']}; {speed:g} m/s"
         case "plants":
             yield from get_args(get_type_hints(Flight)["plant"])
         case "metrics":

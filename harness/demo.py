@@ -71,7 +71,6 @@ def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
     """Writes one recording per pair of the kinematic aircraft and an airframe under the same law."""
     from harness.review.recording import write_recording
 
-    folder.mkdir(parents=True, exist_ok=True)
     for reference in (f for f in flown if f.plant == KINEMATIC):
         for other in (f for f in flown if f[:2] == reference[:2] and f.plant != KINEMATIC):
             path = folder / f"{other.case.name}_{other.law}_{other.plant}.rrd"

@@ -33,8 +33,7 @@ def examine() -> Iterator[Finding]:
             yield Finding(package, "not installed", False)
     for name in aircraft.names():
         airframe = aircraft.folder(name)
-        speed = float(aircraft.data(airframe)["envelope"]["V_design"]["v"])
-        start = Start(airspeed=speed, heading=1.0)
+        start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=1.0)
         error = max(wind_triangle_error(airframe, start, Air(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0)))
         yield Finding(f"wind, {name}", f"v_ground - v_air - wind: {error:.1e} m/s", error < WIND_TOLERANCE)
         units = compare_units(airframe)

@@ -19,6 +19,9 @@ from harness.target import Target, TargetState
 from harness.track import TrackError, load_track
 from harness.wind import Wind
 
+MOST_PERIODS = 4_000_000  # of a flight: its log takes 2 GB
+MOST_STEPS = 40_000_000  # of a flight: its gusts take 2 GB
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InnerLoop:
@@ -47,7 +50,7 @@ class Flight:
     step: Annotated[
         Seconds, Ge(1e-5), Le(0.05), About("of the 6-DOF simulation; periods are whole multiples of it")
     ] = 0.005
-    seed: Annotated[int, Ge(0), About("of everything random")] = 0
+    seed: Annotated[int, Ge(0), Le(10**15), About("of everything random")] = 0
     start: Start = field(default_factory=Start)
     target: Target = field(default_factory=Target)
     wind: Wind = field(default_factory=Wind)
@@ -92,6 +95,14 @@ def problems(flight: Flight) -> list[Problem]:
         if not _is_multiple(period, unit):
             found.append(Problem(name, f"{period:g} s is no whole multiple of {unit_name}, {unit:g} s"))
             break
+    for what, period, most in (
+        ("guidance periods", flight.guidance_period, MOST_PERIODS),
+        ("steps", flight.step, MOST_STEPS),
+    ):
+        if flight.duration / period > most:
+            many = f"takes {flight.duration / period:.3g} {what} of {period:g} s, must be {most:g} at most"
+            found.append(Problem("duration", many))
+            break
     sample, guidance = flight.estimator.period, flight.guidance_period
     if flight.estimator.kind == "ekf":
         if not _is_multiple(sample, flight.step):
@@ -110,14 +121,23 @@ def problems(flight: Flight) -> list[Problem]:
         if gust.to <= gust.from_
     ]
     found += _target_problems(flight)
+    found += _aircraft_problems(flight)
+    return found
+
+
+def _aircraft_problems(flight: Flight) -> list[Problem]:
     try:
-        aircraft.folder(flight.aircraft)
-    except OSError:
+        airframe = aircraft.folder(flight.aircraft)
+    except (OSError, ValueError):  # no folder, or no path at all
         near = get_close_matches(flight.aircraft, aircraft.names(), n=1)
         hint = f" - did you mean {near[0]!r}?" if near else ""
         allowed = ", ".join(aircraft.names())
-        found.append(Problem("aircraft", f"is {flight.aircraft[:60]!r}, must be one of {allowed}, or a folder{hint}"))
-    return found
+        return [Problem("aircraft", f"is {flight.aircraft[:60]!r}, must be one of {allowed}, or a folder{hint}")]
+    try:
+        aircraft.limits(airframe)
+    except aircraft.AirframeError as error:
+        return [Problem("aircraft", str(error))]
+    return []
 
 
 def _target_problems(flight: Flight) -> list[Problem]:
@@ -187,15 +207,14 @@ def warnings(flight: Flight) -> list[str]:
     if feasibility_margin(flight) < 0:
         said.append("the circle is infeasible: the heading-rate limit is below what holding it takes")
     if flight.plant == "sixdof":
-        envelope = aircraft.data(aircraft.folder(flight.aircraft))["envelope"]
-        v_min, v_max = envelope["V_min"]["v"], envelope["V_max"]["v"]
-        if not v_min <= v_a <= v_max:
-            said.append(f"{v_a:g} m/s is outside the airframe's envelope, {v_min:g} to {v_max:g} m/s")
+        limits = aircraft.limits(aircraft.folder(flight.aircraft))
+        if not limits.slowest <= v_a <= limits.fastest:
+            envelope = f"{limits.slowest:g} to {limits.fastest:g} m/s"
+            said.append(f"{v_a:g} m/s is outside the airframe's envelope, {envelope}")
         needed = math.atan(v_a * flight.law.max_heading_rate / 9.80665)
-        limit = aircraft.bank_limit(aircraft.folder(flight.aircraft))
-        if needed > limit:
+        if needed > limits.bank:
             said.append(
                 f"the heading-rate limit takes {math.degrees(needed):.0f} deg of bank, the inner loop allows "
-                f"{math.degrees(limit):.0f}"
+                f"{math.degrees(limits.bank):.0f}"
             )
     return said + flight.law.broken_conditions(ratio)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Protocol
 
-from annotated_types import Gt
+from annotated_types import Ge
 
 from autopilot.quantities import About, Degrees, Metres, MetresPerSecond
 from harness.air import Air
@@ -50,7 +50,7 @@ class Start:
 
     position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (-200.0, 200.0)
     heading: Annotated[Degrees, About("direction of the air velocity, clockwise from north")] = math.radians(30.0)
-    airspeed: Annotated[MetresPerSecond, Gt(0), About("nominal airspeed, held throughout")] = 13.0
+    airspeed: Annotated[MetresPerSecond, Ge(0.1), About("nominal airspeed, held throughout")] = 13.0
     altitude: Annotated[Metres, About("above the ground, held throughout")] = 150.0
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 HEADER = ("time_s", "north_m", "east_m")
 FEWEST = 4  # rows that fix a cubic
+LARGEST = 1e9  # s or m
 
 _SLOWEST = 1e-6  # m/s: a slower target has no direction
 _Row = tuple[float, float, float]
@@ -58,9 +59,14 @@ def load_track(path: Path) -> Track:
     """The track in a file. Raises `TrackError`."""
     try:
         return _load(path, path.stat().st_mtime_ns)
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "no text in UTF-8"
-        raise TrackError(f"{path}: {why}") from None
+    except TrackError:
+        raise
+    except OSError as error:
+        raise TrackError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise TrackError(f"{path}: no text in UTF-8") from None
+    except ValueError as error:  # no path at all
+        raise TrackError(f"{str(path)!r}: {error}") from None
 
 
 @lru_cache(maxsize=16)
@@ -107,6 +113,7 @@ def _number(name: str, cell: str) -> float:
         number = float(cell)
     except ValueError:
         number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {cell[:60]!r}, must be a finite number" if cell else f"{name} is missing")
+    if not abs(number) <= LARGEST:
+        allowed = "must be a finite number" + (f", of {LARGEST:g} at most in size" if math.isfinite(number) else "")
+        raise ValueError(f"{name} is {cell[:60]!r}, {allowed}" if cell else f"{name} is missing")
     return number

@@ -26,7 +26,7 @@ Vector = NDArray[np.float64]
 
 
 def design_start(name: str, heading: float = 0.4) -> Start:
-    return Start(airspeed=float(aircraft.data(aircraft.folder(name))["envelope"]["V_design"]["v"]), heading=heading)
+    return Start(airspeed=aircraft.limits(aircraft.folder(name)).design_airspeed, heading=heading)
 
 
 class Condition(NamedTuple):

@@ -23,7 +23,7 @@ def flown(
 ) -> dict[str, np.ndarray]:
     """A flight from trim with this heading-rate command from the first moment on, a row per step."""
     airframe = aircraft.folder(name)
-    start = Start(airspeed=float(aircraft.data(airframe)["envelope"]["V_design"]["v"]), heading=0.4)
+    start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=0.4)
     flying = SixDof(airframe, STEP, rate_trim).start(start, Air(steady=wind))
     states = [flying.state]
     for _ in range(round(duration / STEP)):
@@ -75,14 +75,14 @@ def test_engagement_leaves_no_transient(name: str, wind: tuple[float, float]) ->
 def test_the_command_is_limited_at_the_bank_limit_and_unwinds_at_once(name: str) -> None:
     """Direction-aware anti-windup: after 10 s of an unreachable command the way back starts as from any turn."""
     airframe = aircraft.folder(name)
-    start = Start(airspeed=float(aircraft.data(airframe)["envelope"]["V_design"]["v"]))
+    start = Start(airspeed=aircraft.limits(airframe).design_airspeed)
     flying = SixDof(airframe, STEP, True).start(start, Air())
     for _ in range(2000):
         flying.advance(math.radians(60.0), STEP)
-    assert flying.state.bank_command == pytest.approx(aircraft.bank_limit(airframe))
+    assert flying.state.bank_command == pytest.approx(aircraft.limits(airframe).bank)
     for _ in range(100):
         flying.advance(0.0, STEP)
-    assert flying.state.bank_command < 0.5 * aircraft.bank_limit(airframe)
+    assert flying.state.bank_command < 0.5 * aircraft.limits(airframe).bank
 
 
 def test_a_turn_to_the_left_mirrors_one_to_the_right() -> None:

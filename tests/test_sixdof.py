@@ -32,7 +32,7 @@ def flight(**changes: object) -> Flight:
 
 @pytest.mark.parametrize("name", aircraft.names())
 def test_ground_velocity_is_air_velocity_plus_wind(name: str) -> None:
-    speed = float(aircraft.data(aircraft.folder(name))["envelope"]["V_design"]["v"])
+    speed = aircraft.limits(aircraft.folder(name)).design_airspeed
     start = Start(airspeed=speed, heading=2.0)
     assert wind_triangle_error(aircraft.folder(name), start, Air(steady=(-3.0, 4.0))) < 1e-6
 

@@ -20,7 +20,9 @@ def demo(out: Path) -> None:
     from rich.progress import Progress
 
     from harness import demo as job
+    from harness.commands.telling import writable_folder
 
+    writable_folder(out)
     terminal = Console(stderr=True)
     flown, written = [], []
     pairs = len(job.CASES) * len(job.LAWS) * len(job.AIRFRAMES)

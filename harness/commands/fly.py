@@ -26,20 +26,16 @@ def fly(file: Path, overrides: tuple[str, ...], rrd: Path | None, as_json: bool)
     from harness.flight import feasibility_margin, warnings
     from harness.key import flight_key
     from harness.metrics import MEANING, metrics
-    from harness.plant import PlantError
     from harness.settings import document
     from harness.simulation import simulate
 
-    settings, flight = read_flight_file(file, overrides)
+    _, flight = read_flight_file(file, overrides)
     if rrd is not None:
         writable(rrd)
     click.echo(feasibility_line(flight), err=as_json)
     for warning in warnings(flight):
         click.echo(f"warning: {warning}", err=True)
-    try:
-        log = simulate(flight)
-    except PlantError as error:
-        raise BadInput(f"{settings.locate(error.key)}: {error}") from None
+    log = simulate(flight)
     judged = metrics(log)
     margin = math.degrees(feasibility_margin(flight))
     result = {

@@ -17,12 +17,11 @@ def reproduce(out: Path) -> None:
     from rich.console import Console
     from rich.progress import Progress
 
-    from harness.commands.telling import writable
+    from harness.commands.telling import writable, writable_folder
     from harness.paper import reproduce as job
     from harness.paper.page import page
 
-    out.mkdir(parents=True, exist_ok=True)
-    path = writable(out / "paper.html")
+    path = writable(writable_folder(out) / "paper.html")
     terminal = Console(stderr=True)
     results = []
     with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as progress:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import tempfile
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -23,14 +25,22 @@ class BadInput(click.ClickException):
 
 
 def read_flight_file(path: Path, overrides: tuple[str, ...]) -> tuple[SettingsFile, Flight]:
-    """The file as read, and the flight that it describes."""
+    """The file as read, and the flight that it describes, once put to its start: what cannot start is bad input."""
+    from harness.air import Air
+    from harness.flight import plant_of
+    from harness.plant import PlantError
     from harness.settings import SettingsError, read_settings
 
     try:
         file = read_settings(path, overrides)
-        return file, file.flight()
+        flight = file.flight()
     except SettingsError as error:
         raise BadInput(str(error)) from None
+    try:
+        plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
+    except PlantError as error:
+        raise BadInput(f"{file.locate(error.key)}: {error}") from None
+    return file, flight
 
 
 def feasibility_line(flight: Flight) -> str:
@@ -55,14 +65,31 @@ def number(value: float | None) -> str:
 def writable(path: Path) -> Path:
     """The path, if a file can be made there."""
     folder = path.parent
-    if path.is_dir():
-        raise BadInput(f"{path}: is a folder, not a file")
-    if not folder.is_dir():
-        raise BadInput(f"{path}: there is no folder {folder}")
     try:
-        probe = folder / f".{path.name}.probe"
-        probe.touch()
-        probe.unlink()
+        if path.is_dir():
+            raise BadInput(f"{path}: is a folder, not a file")
+        if not folder.is_dir():
+            raise BadInput(f"{path}: there is no folder {folder}")
+        if path.exists() and not path.is_file():
+            raise BadInput(f"{path}: is there, and no file that can be replaced")
+        if path.exists() and not (os.access(path, os.W_OK) and path.stat().st_mode & 0o222):
+            raise BadInput(f"{path}: is there, and write-protected")
+        _probe(folder)
     except OSError as error:
         raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
     return path
+
+
+def writable_folder(path: Path) -> Path:
+    """The folder, made if need be, if files can be made in it."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        _probe(path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written to: {error.strerror}") from None
+    return path
+
+
+def _probe(folder: Path) -> None:
+    with tempfile.TemporaryFile(dir=folder):
+        pass

@@ -55,8 +55,11 @@ jsbsim.set_logger(_load_log)
 jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # as its stub has it
 
 
-class ModelError(RuntimeError):
+class ModelError(PlantError):
     """JSBSim could not load the model as it is written."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__("aircraft", message)
 
 
 def _properties(airframe: Path) -> list[str]:
@@ -80,7 +83,7 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
             airframe.name, str(airframe.parent), str(airframe), str(_INNER_LOOP), True
         )
     except jsbsim.BaseError as error:
-        raise ModelError(f"{aircraft.model(airframe)}: {error}") from error
+        raise ModelError(f"{aircraft.model(airframe)}: {' '.join(str(error).split())}") from error
     if not loaded or _load_log.problems:
         raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
     missing = [name for name in _properties(airframe) if not fdm.get_property_manager().hasNode(name)]
@@ -134,7 +137,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
         x = Trim._make(v - share * d for v, d in zip(x, change, strict=True))
     found = max(map(abs, _accelerations(fdm, x))) < 1e-8
     if not (found and 0.0 < x.throttle < 1.0 and abs(x.pitch) < math.pi / 6):
-        raise NoTrimError(f"no level trim at {start.airspeed:g} m/s")
+        raise NoTrimError(f"no level trim at {start.airspeed:g} m/s, {start.altitude:g} m high")
     return x
 
 
@@ -248,21 +251,19 @@ class SixDof:
     def start(self, start: Start, air: Air) -> "_SixDofFlying":
         if not start.altitude > GROUND:
             raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
-        data = aircraft.data(self.airframe)
-        stall, envelope = data["aero"]["alpha_stall"]["v"], data["envelope"]
+        limits = aircraft.limits(self.airframe)
         fdm = load(self.airframe, self.step)
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:
-            slowest, fastest = envelope["V_min"]["v"], envelope["V_max"]["v"]
-            allowed = f"{self.airframe.name} flies from {slowest:g} to {fastest:g} m/s"
+            allowed = f"{self.airframe.name} flies from {limits.slowest:g} to {limits.fastest:g} m/s"
             raise PlantError("start.airspeed", f"{error}; {allowed}") from None
         blow = _blower(fdm, air) if len(air.gusts) else None
         if blow:
             blow()
             fdm.run_ic()  # trimmed for the steady wind, the aircraft is met by the first gust
         engage(fdm, trimmed, start, self.rate_trim)
-        return _SixDofFlying(fdm, self.step, start, air, stall, blow)
+        return _SixDofFlying(fdm, self.step, start, air, limits.stall, blow)
 
 
 def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
@@ -397,7 +398,7 @@ def compare_units(airframe: Path) -> list[UnitCheck]:
     data = aircraft.data(airframe)
     mass, ref = data["mass"], data["ref"]
     fdm = load(airframe, 0.005)
-    start = Start(airspeed=float(data["envelope"]["V_design"]["v"]))
+    start = Start(airspeed=aircraft.limits(airframe).design_airspeed)
     trim(fdm, start, Air())
     return [
         UnitCheck(*row)

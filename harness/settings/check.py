@@ -16,8 +16,9 @@ from pydantic import (
     ValidationError,
     create_model,
 )
+from pydantic_core import PydanticCustomError
 
-from harness.settings.mistake import Places, mistake, settings_error
+from harness.settings.mistake import LARGEST, Places, mistake, settings_error
 from harness.settings.table import Setting, Table
 
 
@@ -40,6 +41,13 @@ def _made(table: Table, model: BaseModel) -> object:
     return table.make(**{s.name: getattr(model, key) for key, s in table.settings.items() if key in given})
 
 
+def _sized(number: float) -> float:
+    """The number, unless it is so large that what is computed from it would not be finite."""
+    if LARGEST < abs(number) < math.inf:
+        raise PydanticCustomError("too_large", "too large")
+    return number
+
+
 def _type(setting: Setting) -> Any:
     """The annotation that pydantic checks the value by, and makes it SI."""
     one: Any
@@ -47,7 +55,7 @@ def _type(setting: Setting) -> Any:
         one = Annotated[_model(table), AfterValidator(lambda model: _made(table, model))]
     elif setting.kind is float:
         si = AfterValidator(lambda number: number * setting.unit.si)
-        one = Annotated[float, Strict(), AllowInfNan(setting.infinite), *setting.bounds, si]
+        one = Annotated[float, Strict(), AllowInfNan(setting.infinite), *setting.bounds, AfterValidator(_sized), si]
         if setting.infinite:  # JSON has no infinity
             one = Annotated[one, BeforeValidator(lambda given: math.inf if given == "inf" else given)]
     elif setting.kind in (int, bool, str):

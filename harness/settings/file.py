@@ -1,5 +1,6 @@
 """A settings file as it was read: what it says, and where; and the flight in it."""
 
+import os
 import re
 import sys
 import tomllib
@@ -7,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import aircraft
 from autopilot.laws import LAWS
 from harness.flight import Flight, problems
 from harness.settings.check import checked
@@ -106,7 +108,7 @@ def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> 
 
 
 def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:
-    """The flight of a [flight] table in file units; a track's path is from `folder`.
+    """The flight of a [flight] table in file units; paths of a track and an airframe are from `folder`.
 
     Raises `SettingsError`, its lines without a place.
     """
@@ -131,7 +133,7 @@ def _parsed(value: str) -> object:
 
 
 def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flight:
-    """The flight, checked whole. A track's path is from `folder`, where the settings are."""
+    """The flight, checked whole. Paths of a track and of an airframe are from `folder`, where the settings are."""
     match document:
         case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS:
             table = document_table(name, law.get("gains") == CUSTOM)
@@ -142,6 +144,9 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
     if flight.target.track is not None:
         track = str(folder.absolute() / flight.target.track)
         flight = replace(flight, target=replace(flight.target, track=track))
+    beside = str(folder.absolute() / flight.aircraft)
+    if flight.aircraft not in ("", *aircraft.names()) and os.path.isdir(beside):  # noqa: PTH112 - knows no error
+        flight = replace(flight, aircraft=beside)
     found = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
     if found:
         raise settings_error(found, place)

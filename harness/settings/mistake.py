@@ -12,6 +12,8 @@ from pydantic_core import ErrorDetails
 from harness.settings.table import Setting, Table
 from harness.settings.toml_locator import Key, dotted
 
+LARGEST = 1e9  # in file units: what a number that has no bound of its own may be
+
 _NOUNS: Mapping[object, str] = {float: "number", int: "whole number", str: "string"}
 _COUNTS = {2: "two", 3: "three"}
 _BOUNDS = {Gt: ">", Ge: ">=", Lt: "<", Le: "<="}
@@ -72,6 +74,8 @@ def mistake(table: Table, document: Any, details: ErrorDetails) -> Mistake:
     expected = _expected(replace(setting, length=None) if isinstance(key[-1], int) else setting)
     if details["type"] == "finite_number":
         expected = expected.replace("number", "finite number")
+    if details["type"] == "too_large":
+        expected += f", of {LARGEST:g} at most in size"
     return Mistake(key, f"is {_shown(value)}, must be {expected}{_did_you_mean(value, _choices(setting))}")
 
 
