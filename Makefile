@@ -25,8 +25,9 @@ install: .venv/installed  ## .venv with .venv/bin/harness
 models: install  ## write the JSBSim models from the airframes' data
 	$(BIN)/python -m aircraft.write_models
 
-bench: install  ## the speed of the loop, as ratios in one run
+bench: install  ## the speed of the loop, as ratios in one run, and of --help
 	$(BIN)/python -m benchmarks.flight_speed
+	$(BIN)/python -m benchmarks.help_speed
 
 lock:  ## resolve the dependencies anew (needs uv)
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \
