@@ -1,12 +1,13 @@
 """The main job: the paper's stationary target under both laws, on the kinematic and two 6-DOF aircraft side by side."""
 
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
 from harness.commands.telling import number
-from harness.flight import Flight, feasibility_margin
+from harness.flight import Flight, feasibility_margin, needed_heading_rate
 from harness.flight_log import FlightLog
 from harness.metrics import metrics
 from harness.settings import flight_from_document
@@ -113,32 +114,28 @@ def table(flown: list[Flown]) -> list[str]:
 
 def differences(flown: list[Flown]) -> list[str]:
     """What differs between the plants in one case, in sentences made of the numbers alone."""
-    case = flown[0].case
-    said = []
-    if feasibility_margin(flown[0].log.flight) < 0:
-        least, worst = (f(flown, key=lambda one: one.metrics["range_error_peak_m"] or 0.0) for f in (min, max))
-        left = [f"{number(f.metrics['range_error_peak_m'])} m ({f.law}, {f.plant})" for f in (least, worst)]
+    case, said = flown[0].case, []
+    feasible = feasibility_margin(flown[0].log.flight) >= 0
+    if not feasible:
+        needed = math.degrees(needed_heading_rate(flown[0].log.flight))
         said.append(
-            f"Infeasible: holding the circle takes more than {case.max_heading_rate_deg_s:g} deg/s in this wind, "
-            f"and every plant leaves it, by {left[0]} to {left[1]}."
+            f"Infeasible: holding the circle in this wind takes up to {needed:.2f} deg/s, the limit is "
+            f"{case.max_heading_rate_deg_s:g}. Every plant leaves it once a lap; what settles has only come back from "
+            "the last time."
         )
-    return said + [_law_across_plants([one for one in flown if one.law == law]) for law in LAWS]
+    return said + [_law_across_plants([one for one in flown if one.law == law], feasible) for law in LAWS]
 
 
-def _law_across_plants(flown: list[Flown]) -> str:
+def _law_across_plants(flown: list[Flown], feasible: bool) -> str:
     """`flown` is one law's flights, the kinematic one first."""
     kinematic, *others = flown
-    before = kinematic.metrics["convergence_time_s"]
-    settling = [f"{_settles(before)} on the kinematic aircraft"]
-    for one in others:
-        after = one.metrics["convergence_time_s"]
-        later = f" ({after - before:+.1f} s)" if after is not None and before is not None else ""
-        settling.append(f"{_settles(after)}{later} on {one.plant}")
     activity = [one.metrics["command_activity_deg_s2"] or 0.0 for one in flown]
     chatters = min(activity[1:]) > CHATTER * max(activity[0], 0.1)
+    arrives = _beside(flown, "convergence_time_s", "settles {}", "in {:.1f} s", "{:+.1f} s", "never")
+    leaves = _beside(flown, "range_error_peak_m", "leaves the circle {}", "by {:.1f} m", "{:+.1f} m", "not at all")
     return (
-        f"{kinematic.law} settles: {', '.join(settling)}. In the last half its command is at the limit "
-        f"{_each(flown, 'saturation_fraction', 100.0)} % of the time and moves by "
+        f"{kinematic.law} {arrives if feasible else leaves}. Over the last half, on the same aircraft, its command is "
+        f"at the limit {_each(flown, 'saturation_fraction', 100.0)} % of the time and moves by "
         f"{_each(flown, 'command_activity_deg_s2')} deg/s2"
         f"{': behind an inner loop it chatters' if chatters else ''}; the range error is "
         f"{_each(flown, 'range_error_rms_m')} m rms. "
@@ -149,8 +146,16 @@ def _law_across_plants(flown: list[Flown]) -> str:
 CHATTER = 10.0  # times the kinematic activity, itself taken as 0.1 deg/s2 at least
 
 
-def _settles(time: float | None) -> str:
-    return "never" if time is None else f"in {time:.1f} s"
+def _beside(flown: list[Flown], metric: str, sentence: str, told: str, difference: str, none: str) -> str:
+    """A metric on each aircraft, and how far it is from the kinematic one's, in words."""
+    reference, words = flown[0].metrics[metric], []
+    for i, one in enumerate(flown):
+        value = one.metrics[metric]
+        where = one.plant if i else "the kinematic aircraft"
+        words.append(f"{none if value is None else told.format(value)} on {where}")
+        if i and value is not None and reference is not None:
+            words[-1] += f" ({difference.format(value - reference)})"
+    return sentence.format(", ".join(words))
 
 
 def _each(flown: list[Flown], metric: str, scale: float = 1.0) -> str:
