@@ -1,6 +1,7 @@
 """Flies a guidance law on a kinematic and on a 6-DOF aircraft, and measures whether coordinated flight holds.
 
-`load_flight(path)` reads a flight, `simulate(flight)` flies it, `read_flight(path)` reads a recording back.
+`load_flight(path)` reads a flight, `simulate(flight)` flies it, `read_flight(path)` reads a recording back;
+`load_results(dir)` reads the results of `harness run`.
 """
 
 from importlib import import_module
@@ -8,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from harness.review.recording import read_recording as read_flight
+    from harness.runs.results import load_results
     from harness.settings import load_flight
     from harness.simulation import simulate
 
-__all__ = ["load_flight", "read_flight", "simulate"]
+__all__ = ["load_flight", "load_results", "read_flight", "simulate"]
 
 _HOME = {
     "load_flight": ("harness.settings", "load_flight"),
+    "load_results": ("harness.runs.results", "load_results"),
     "read_flight": ("harness.review.recording", "read_recording"),
     "simulate": ("harness.simulation", "simulate"),
 }

@@ -10,6 +10,8 @@ from harness.commands.doctor import doctor
 from harness.commands.fly import fly
 from harness.commands.list import list_
 from harness.commands.reproduce import reproduce
+from harness.commands.run import run
+from harness.commands.show import show
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -23,7 +25,7 @@ def harness() -> None:
     """
 
 
-for command in (fly, check, list_, demo, reproduce, doctor):
+for command in (fly, run, show, check, list_, demo, reproduce, doctor):
     harness.add_command(command)
 
 

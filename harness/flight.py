@@ -80,6 +80,11 @@ def plant_of(flight: Flight) -> Plant:
     return SixDof(aircraft.folder(flight.aircraft), flight.step, flight.inner_loop.rate_trim)
 
 
+def try_start(flight: Flight) -> None:
+    """Puts the aircraft to its start in the steady wind. Raises `PlantError` when it cannot fly so."""
+    plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
+
+
 def air_of(flight: Flight) -> Air:
     """The air that the flight meets: the same for every plant, law and guidance period."""
     return flight.wind.start(flight.start.altitude, flight.step, flight.duration)

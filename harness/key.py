@@ -2,10 +2,11 @@
 
 import hashlib
 import json
-from collections.abc import Iterator
-from functools import lru_cache
+from collections.abc import Mapping
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import aircraft
 import autopilot
@@ -15,36 +16,76 @@ from harness.settings import document
 PHYSICS = 1  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
 
 
+class Identity(NamedTuple):
+    """What makes a flight this one."""
+
+    settings: Mapping[str, Any]  # a [flight] table in file units
+    version: Mapping[str, Any]  # all else: of the physics, of the libraries, and a hash of each file's content
+
+    @property
+    def key(self) -> str:
+        settings = self.settings
+        if settings["target"]["track"] is not None:  # its content counts, not where it lies
+            settings = {**settings, "target": {**settings["target"], "track": "content"}}
+        return hashed({"settings": settings, **self.version})
+
+
+def identity(flight: Flight) -> Identity:
+    """What makes the flight this one. OSError when a file that it reads is gone."""
+    return Identity(document(flight), version_of(flight))
+
+
+def version_of(flight: Flight) -> dict[str, Any]:
+    """All that decides the flight beside its settings, as it is now."""
+    return {
+        "physics": PHYSICS,
+        "content": {name: _digest(path, path.stat().st_mtime_ns) for name, path in files(flight).items()},
+        "jsbsim": _installed("jsbsim") if flight.plant == "sixdof" else None,
+        "filterpy": _installed("filterpy") if flight.estimator.kind == "ekf" else None,
+    }
+
+
 def flight_key(flight: Flight) -> str:
     """32 hex digits, equal exactly when the same flight would be flown."""
-    settings = document(flight)
+    return identity(flight).key
+
+
+def files(flight: Flight) -> dict[str, Path]:
+    """Every file whose content decides the flight, by a name that says what it is for."""
+    on_board = Path(autopilot.__file__).parent
+    found = {f"autopilot/{name}": on_board / name for name in _sources(on_board)}
     if flight.target.track is not None:
-        settings["target"]["track"] = "content"  # counts, not where it lies
-    decides = {
-        "settings": settings,
-        "physics": PHYSICS,
-        "content": {name: _digest(path, path.stat().st_mtime_ns) for name, path in _files(flight)},
-        "jsbsim": version("jsbsim") if flight.plant == "sixdof" else None,
-        "filterpy": version("filterpy") if flight.estimator.kind == "ekf" else None,
-    }
-    canonical = json.dumps(decides, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        found["target/track"] = Path(flight.target.track)
+    if flight.plant == "sixdof":
+        found["autopilot/inner_loop.xml"] = on_board / "inner_loop.xml"
+        found["harness/plants/planet.xml"] = Path(__file__).parent / "plants" / "planet.xml"
+        airframe = aircraft.folder(flight.aircraft)
+        found["aircraft/model"] = aircraft.model(airframe)
+        for name in ("airframe.toml", "inner_loop.toml"):
+            found[f"aircraft/{name}"] = airframe / name
+    return found
+
+
+def hashed(content: object) -> str:
+    """32 hex digits of what JSON can hold, whatever the order of its keys."""
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
 
 
-def _files(flight: Flight) -> Iterator[tuple[str, Path]]:
-    on_board = Path(autopilot.__file__).parent
-    for path in sorted(on_board.glob("*.py")):
-        yield f"autopilot/{path.name}", path
-    if flight.target.track is not None:
-        yield "target/track", Path(flight.target.track)
-    if flight.plant == "sixdof":
-        yield "autopilot/inner_loop.xml", on_board / "inner_loop.xml"
-        yield "harness/plants/planet.xml", Path(__file__).parent / "plants" / "planet.xml"
-        airframe = aircraft.folder(flight.aircraft)
-        yield "aircraft/model", aircraft.model(airframe)
-        yield "aircraft/airframe.toml", airframe / "airframe.toml"
+def content_hash(content: bytes) -> str:
+    """32 hex digits of a file's content."""
+    return hashlib.blake2b(content, digest_size=16).hexdigest()
+
+
+@cache
+def _sources(on_board: Path) -> tuple[str, ...]:
+    """The Python files of the autopilot: a process runs those that it found when it began."""
+    return tuple(sorted(path.name for path in on_board.glob("*.py")))
+
+
+_installed = cache(version)
 
 
 @lru_cache(maxsize=256)
 def _digest(path: Path, modified: int) -> str:
-    return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
+    return content_hash(path.read_bytes())

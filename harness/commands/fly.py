@@ -1,67 +1,99 @@
-"""`harness fly`: one flight."""
+"""`harness fly`: one flight, of a file or of a row."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+if TYPE_CHECKING:
+    from harness.flight_log import FlightLog
+    from harness.runs.recall import Place, Recalled
+    from harness.runs.row import Row
+
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("what", metavar="FILE|DIR:KEY")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
 @click.option("--rrd", type=click.Path(path_type=Path), help="Write a Rerun recording there.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout instead of the table.")
-def fly(file: Path, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) -> None:
-    """Fly the flight that FILE describes, and print its metrics.
+def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) -> None:
+    """Fly the flight that FILE describes, or again a row of a run, and print its metrics.
+
+    A row without --set is compared with what is stored. The beginning of its key is enough.
 
     \b
     Examples:
       harness fly experiments/stationary.toml --rrd flight.rrd
       harness fly experiments/stationary.toml --set plant=kinematic --set law.name=smc --set law.gains=paper --json
+      harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0]
     """
     import json
-    import math
 
-    from harness.commands.telling import BadInput, feasibility_line, number, read_flight_file, writable
-    from harness.flight import feasibility_margin, warnings
-    from harness.key import flight_key
-    from harness.metrics import MEANING, metrics
-    from harness.settings import document
+    from harness.commands.telling import BadInput, feasibility_line, flight_of, number, read_file, writable
+    from harness.flight import warnings
+    from harness.metrics import MEANING
+    from harness.runs.recall import place_of
+    from harness.runs.row import row_of
     from harness.simulation import simulate
 
-    _, flight = read_flight_file(file, overrides)
+    place = place_of(what)
+    recalled = _recalled(place) if place else None
+    settings = recalled.file(what, overrides) if recalled else read_file(Path(what), overrides)
+    flight = flight_of(settings)
     if rrd is not None:
         writable(rrd)
     click.echo(feasibility_line(flight), err=as_json)
     for warning in warnings(flight):
         click.echo(f"warning: {warning}", err=True)
     log = simulate(flight)
-    judged = metrics(log)
-    margin = math.degrees(feasibility_margin(flight))
-    result = {
-        "key": flight_key(flight),
-        "outcome": log.outcome.value,
-        "reason": log.reason,
-        "digest": log.digest,
-        "flight": document(flight),
-        "metrics": judged,
-        "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # none without a limit
-    }
+    result = row_of(log)
+    if recalled and not overrides:
+        result.update(key=recalled.stored.row["key"], flight=recalled.stored.row["flight"])
+        _compare(recalled, log, result)
     if rrd is not None:
         from harness.review.recording import write_recording
 
-        rows = "\n".join(f"| {name} | {number(value)} |" for name, value in judged.items())
+        rows = "\n".join(f"| {name} | {number(value)} |" for name, value in result["metrics"].items())
         set_to = json.dumps(result["flight"], indent=1)
         notes = f"{feasibility_line(flight)}\n\n| metric | |\n|---|---|\n{rows}\n\n```json\n{set_to}\n```"
         try:
-            write_recording(rrd, {flight.plant: log}, file.stem, notes)
+            write_recording(rrd, {flight.plant: log}, Path(what).stem, notes)
         except OSError as error:
             raise BadInput(f"{rrd}: cannot be written: {error.strerror or error}") from None
     if as_json:
         click.echo(json.dumps(result, allow_nan=False))
     else:
-        _tell(result, {name: (number(value), MEANING[name]) for name, value in judged.items()})
+        _tell(result, {name: (number(value), MEANING[name]) for name, value in result["metrics"].items()})
     raise SystemExit(1 if log.outcome.failed else 0)
+
+
+def _recalled(place: Place) -> Recalled:
+    from harness.commands.telling import BadInput
+    from harness.runs.recall import recall
+    from harness.runs.store import StoreError
+
+    try:
+        return recall(place)
+    except StoreError as error:
+        raise BadInput(str(error)) from None
+
+
+def _compare(recalled: Recalled, log: FlightLog, row: Row) -> None:
+    """Says whether the flight is the stored one, to the last bit."""
+    from harness.runs.recall import deviation
+
+    if not recalled.digest:
+        click.echo(f"the row has no digest to compare with: it ended in {recalled.stored.row['outcome']}", err=True)
+    elif apart := deviation(recalled.stored.row, row, log):
+        why = (
+            f"changed since: {', '.join(recalled.changed)}" if recalled.changed else "though nothing known has changed"
+        )
+        click.echo(f"warning: not the flight that is stored ({why}): {apart}", err=True)
+    else:
+        click.echo("the same flight as stored, to the last bit", err=True)
 
 
 def _tell(result: Mapping[str, object], rows: dict[str, tuple[str, str]]) -> None:

@@ -24,23 +24,31 @@ class BadInput(click.ClickException):
         click.echo(self.message, err=True)
 
 
-def read_flight_file(path: Path, overrides: tuple[str, ...]) -> tuple[SettingsFile, Flight]:
-    """The file as read, and the flight that it describes, once put to its start: what cannot start is bad input."""
-    from harness.air import Air
-    from harness.flight import plant_of
-    from harness.plant import PlantError
+def read_file(path: Path, overrides: tuple[str, ...]) -> SettingsFile:
+    """The file as read."""
     from harness.settings import SettingsError, read_settings
 
     try:
-        file = read_settings(path, overrides)
+        return read_settings(path, overrides)
+    except SettingsError as error:
+        raise BadInput(str(error)) from None
+
+
+def flight_of(file: SettingsFile) -> Flight:
+    """The flight that a file describes, once put to its start: what cannot start is bad input."""
+    from harness.flight import try_start
+    from harness.plant import PlantError
+    from harness.settings import SettingsError
+
+    try:
         flight = file.flight()
     except SettingsError as error:
         raise BadInput(str(error)) from None
     try:
-        plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
+        try_start(flight)
     except PlantError as error:
         raise BadInput(f"{file.locate(error.key)}: {error}") from None
-    return file, flight
+    return flight
 
 
 def feasibility_line(flight: Flight) -> str:

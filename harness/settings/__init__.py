@@ -1,7 +1,14 @@
 """Settings: the border between a TOML file (keys with unit suffixes, degrees) and a flight (SI, radians)."""
 
 from harness.settings.experiment import Experiment
-from harness.settings.file import SettingsFile, flight_from_document, load_flight, read_settings, settings_from_text
+from harness.settings.file import (
+    SettingsFile,
+    flight_from_document,
+    load_flight,
+    overridden,
+    read_settings,
+    settings_from_text,
+)
 from harness.settings.keys import file_key, put
 from harness.settings.mistake import SettingsError
 from harness.settings.written import document
@@ -14,6 +21,7 @@ __all__ = [
     "file_key",
     "flight_from_document",
     "load_flight",
+    "overridden",
     "put",
     "read_settings",
     "settings_from_text",

@@ -5,6 +5,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -88,7 +89,13 @@ def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> 
         raise SettingsError([f"{path}:{line}: no valid TOML: {what}"]) from None
     except (ValueError, RecursionError) as error:  # a number of too many digits, arrays too deep
         raise SettingsError([f"{path}: no valid TOML: {error}"]) from None
-    merged: dict[Key, str] = {}
+    return overridden(SettingsFile(path, document, key_lines(text), {}), overrides)
+
+
+def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
+    """The file with the texts KEY=VALUE merged into its [flight]. Raises `SettingsError`."""
+    document = deepcopy(dict(file.document))
+    merged = dict(file.overrides)
     wrong = []
     for override in overrides:
         name, equals, value = override.partition("=")
@@ -104,7 +111,7 @@ def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> 
         merged[key] = override
     if wrong:
         raise SettingsError(wrong)
-    return SettingsFile(path, document, key_lines(text), merged)
+    return replace(file, document=document, overrides=merged)
 
 
 def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:

@@ -1,0 +1,35 @@
+"""How long flights take: a guess from their length, corrected by those that were flown."""
+
+from harness.flight import Flight
+
+CHUNK = 0.3  # s of flights in one message to a worker
+# Seconds on the machine of `make bench`: per guidance period of any plant, per step of JSBSim, per measurement.
+_PERIOD, _STEP, _SAMPLE = 6e-6, 6.5e-6, 60e-6
+_BEGIN, _LOAD = 0.003, 0.012  # of any flight, metrics and digest included; of loading and trimming an airframe
+_FORGETTING = 0.2
+
+
+class Estimate:
+    """Seconds that flights take on this machine; learns while they are flown."""
+
+    def __init__(self) -> None:
+        self._ratio: dict[str, float] = {}  # of what they take to what was guessed, by plant
+
+    def seconds(self, flight: Flight) -> float:
+        """Wall time of the flight in one process."""
+        return guess(flight) * self._ratio.get(flight.plant, 1.0)
+
+    def learn(self, flight: Flight, seconds: float) -> None:
+        """Takes in how long it took."""
+        ratio, known = seconds / guess(flight), self._ratio.get(flight.plant)
+        self._ratio[flight.plant] = ratio if known is None else known + _FORGETTING * (ratio - known)
+
+
+def guess(flight: Flight) -> float:
+    """Seconds on a machine like that of `make bench`."""
+    seconds = _BEGIN + flight.periods * _PERIOD
+    if flight.plant == "sixdof":
+        seconds += _LOAD + flight.duration / flight.step * _STEP
+    if flight.estimator.kind == "ekf":
+        seconds += flight.duration / flight.estimator.period * _SAMPLE
+    return seconds

@@ -1,0 +1,232 @@
+"""A matrix of flights: axes over any keys of [flight], expanded one flight at a time and always in the same order."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+from harness.flight import Flight
+from harness.key import hashed
+from harness.randomness import stream
+from harness.runs.axis import Axis, Draw, axis, flattened
+from harness.settings import Experiment, SettingsError, SettingsFile, flight_from_document, put
+from harness.settings.toml_locator import Key, nearest_line
+
+
+class Combination(NamedTuple):
+    """One flight of a matrix before it is checked: a value for each key of each axis, in file units."""
+
+    position: int  # in the matrix, excluded ones counted
+    values: Mapping[str, object]
+    lines: Mapping[str, int]  # where each value stands
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A product of axes, the last one fastest; and what is drawn for each of its seeds."""
+
+    axes: Sequence[Axis]
+    draws: Sequence[Draw]
+
+    def __len__(self) -> int:
+        return math.prod(len(a.values) for a in self.axes)
+
+
+@dataclass(frozen=True, slots=True)
+class Matrix:
+    """All flights of an experiment's file: the product of [matrix], then one block per [[include]]."""
+
+    file: SettingsFile
+    experiment: Experiment
+    blocks: Sequence[Block]
+    excluded: Sequence[Mapping[str, object]]
+
+    @property
+    def positions(self) -> int:
+        """How many combinations there are, excluded ones counted."""
+        return sum(len(block) for block in self.blocks)
+
+    @property
+    def draws(self) -> list[str]:
+        """The keys whose values are drawn from the seed."""
+        return list(dict.fromkeys(draw.key for block in self.blocks for draw in block.draws))
+
+    @property
+    def identifier(self) -> str:
+        """Equal for equal matrices: then equal positions are equal settings."""
+        tables = {name: self.file.document.get(name) for name in ("flight", "matrix", "exclude", "include")}
+        tables["overrides"] = sorted(".".join(map(str, key)) for key in self.file.overrides)
+        return hashed({**_plain(tables), "folder": str(self.file.path.parent.absolute())})
+
+    def __len__(self) -> int:
+        """The number of flights."""
+        if not self.excluded:
+            return self.positions
+        return sum(1 for _ in self.combinations())
+
+    def combinations(self) -> Iterator[Combination]:
+        """All of them, lazily, excluded ones left out."""
+        return (found for position in range(self.positions) if (found := self.at(position)) is not None)
+
+    def at(self, position: int) -> Combination | None:
+        """The combination at a position; None when it is excluded."""
+        place = position
+        number = 0
+        while place >= len(self.blocks[number]):
+            place, number = place - len(self.blocks[number]), number + 1
+        block = self.blocks[number]
+        values: dict[str, object] = {}
+        lines: dict[str, int] = {}
+        for a in reversed(block.axes):
+            place, i = divmod(place, len(a.values))
+            values.update(zip(a.keys, a.values[i], strict=True))
+            lines.update(dict.fromkeys(a.keys, a.lines[i]))
+        if number == 0 and any(all(values.get(k) == v for k, v in table.items()) for table in self.excluded):
+            return None
+        if block.draws:
+            seed = _seed(values.get("seed", _table(self.file.document, "flight").get("seed", 0)))
+            for draw in block.draws:
+                values[draw.key] = draw.value(stream(seed, f"matrix:{draw.key}"))
+                lines[draw.key] = draw.line
+        return Combination(position, values, lines)
+
+    def group(self, position: int) -> int:
+        """A number that all flights share which differ in the plant alone."""
+        place, group = position, 0
+        for block in self.blocks:
+            if place >= len(block):
+                place, group = place - len(block), group + len(block)
+                continue
+            size = 1
+            for a in reversed(block.axes):
+                place, i = divmod(place, len(a.values))
+                if a.keys != ("plant",):
+                    group, size = group + i * size, size * len(a.values)
+            return group
+        raise IndexError(position)
+
+    def flight(self, combination: Combination) -> Flight:
+        """The flight, checked. Raises `SettingsError` with the lines of the values that make it wrong."""
+        try:
+            return flight_from_document(self._document(combination)["flight"], self.file.path.parent)
+        except SettingsError:
+            return self.located(combination).flight()  # raises the same, with its place
+
+    def located(self, combination: Combination) -> SettingsFile:
+        """The combination as a file of one flight, whose values stand where the matrix has them."""
+        lines: dict[Key, int] = {("flight", *key.split(".")): line for key, line in combination.lines.items()}
+        return replace(self.file, document=self._document(combination), lines={**self.file.lines, **lines})
+
+    def _document(self, combination: Combination) -> dict[str, Any]:
+        document: dict[str, Any] = {"flight": deepcopy(_table(self.file.document, "flight"))}
+        for key, value in combination.values.items():
+            put(document, key, value)
+        return document
+
+
+def read_matrix(file: SettingsFile) -> Matrix:
+    """The matrix of a file; a file without one is a matrix of one flight. Raises `SettingsError`.
+
+    A key given by `--set` is no axis any more: it has that value in every flight.
+    """
+    experiment = file.experiment()
+    mistakes: list[str] = []
+    fixed = [key[1:] for key in file.overrides]
+    first = _block(file, ("matrix",), experiment.matrix, lists=True, fixed=fixed, mistakes=mistakes)
+    blocks = [first]
+    for i, table in enumerate(experiment.include):
+        blocks.append(_block(file, ("include", i), table, lists=False, fixed=fixed, mistakes=mistakes))
+    excluded = [
+        checked
+        for i, table in enumerate(experiment.exclude)
+        if (checked := _exclusion(file, ("exclude", i), table, first, fixed, mistakes))
+    ]
+    if mistakes:
+        raise SettingsError(mistakes)
+    return Matrix(file, experiment, blocks, excluded)
+
+
+def _block(
+    file: SettingsFile, at: Key, table: Mapping[str, object], *, lists: bool, fixed: Sequence[Key], mistakes: list[str]
+) -> Block:
+    axes: list[Axis] = []
+    draws: list[Draw] = []
+    seen: set[str] = set()
+    for key, name, value in flattened(table):
+        where = (*at, *key)
+        try:
+            made = axis(name, value, lists=lists, line=partial(_line, file, where))
+        except ValueError as error:
+            mistakes.append(f"{file.path}:{_line(file, where)}: {'.'.join(map(str, at))}.{name}: {error}")
+            continue
+        keys = made.keys if isinstance(made, Axis) else (made.key,)
+        if twice := seen.intersection(keys):
+            mistakes.append(
+                f"{file.path}:{_line(file, where)}: {at[0]}.{name}: {', '.join(sorted(twice))} is an axis already"
+            )
+        seen.update(keys)
+        free = [k for k in keys if not _is_fixed(k, fixed)]
+        if isinstance(made, Draw):
+            draws += [made] if free else []
+        elif free:
+            axes.append(made.only(free))
+    axes.sort(key=lambda a: a.keys == ("plant",))  # the plant fastest: pairs are complete early
+    return Block(axes, draws)
+
+
+def _exclusion(
+    file: SettingsFile,
+    at: Key,
+    table: Mapping[str, object],
+    block: Block,
+    fixed: Sequence[Key],
+    mistakes: list[str],
+) -> Mapping[str, object]:
+    """The combinations to leave out; empty when there is a mistake in it, or `--set` fixes a key of it."""
+    choices = {key: [v[i] for v in a.values] for a in block.axes for i, key in enumerate(a.keys)}
+    checked = {}
+    for key, name, value in flattened(table):
+        place = f"{file.path}:{_line(file, (*at, *key))}: exclude.{name}"
+        if name not in choices:
+            if _is_fixed(name, fixed):
+                return {}
+            known = ", ".join(sorted(choices)) or "none"
+            mistakes.append(f"{place}: is no axis of [matrix] with listed values; those are: {known}")
+        elif value not in choices[name]:
+            shown = ", ".join(map(str, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
+            mistakes.append(f"{place}: excludes nothing: {value!r} is none of {shown}")
+        else:
+            checked[name] = value
+    return checked
+
+
+def _is_fixed(name: str, fixed: Sequence[Key]) -> bool:
+    """Whether `--set` gives this key, or a table around it."""
+    words = tuple(name.split("."))
+    return any(words[: len(key)] == key for key in fixed)
+
+
+def _line(file: SettingsFile, key: Key, element: int | None = None) -> int:
+    return nearest_line(file.lines, key if element is None else (*key, element))
+
+
+def _seed(value: object) -> int:
+    """The seed to draw from; one that is none is told when the flight is checked."""
+    return value if isinstance(value, int) and value >= 0 else 0
+
+
+def _table(document: Mapping[str, object], name: str) -> Mapping[str, Any]:
+    table = document.get(name, {})
+    return table if isinstance(table, Mapping) else {}
+
+
+def _plain(tables: object) -> Any:
+    """As JSON can hold it: dates and infinities as texts."""
+    if isinstance(tables, Mapping):
+        return {str(key): _plain(value) for key, value in tables.items()}
+    if isinstance(tables, list | tuple):
+        return [_plain(value) for value in tables]
+    finite = isinstance(tables, float) and math.isfinite(tables)
+    return tables if finite or isinstance(tables, int | str | None) else str(tables)

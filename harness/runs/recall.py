@@ -1,0 +1,137 @@
+"""A row flown again: from what the store holds, although the files that it was flown with may be gone."""
+
+import atexit
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import aircraft
+from harness.flight import Flight
+from harness.flight_log import FlightLog
+from harness.key import content_hash, version_of
+from harness.runs.row import Row, final, row_of
+from harness.runs.store import Stored, content, find
+from harness.settings import SettingsFile, flight_from_document, overridden
+from harness.simulation import simulate
+
+
+class Place(NamedTuple):
+    """`DIR:KEY`: a row of an earlier run, by the beginning of its key."""
+
+    folder: Path
+    beginning: str
+
+
+def place_of(text: str) -> Place | None:
+    """The row that a word of the command line names; None when it names something else."""
+    folder, colon, key = text.rpartition(":")
+    if not colon or Path(text).exists() or not Path(folder).is_dir():
+        return None
+    return Place(Path(folder), key.strip().lower())
+
+
+@dataclass(frozen=True, slots=True)
+class Recalled:
+    """A row, and its settings as they can be flown now."""
+
+    stored: Stored
+    settings: Mapping[str, Any]  # a [flight] table; what is gone or has changed is replaced by unpacked copies
+    flight: Flight
+    changed: tuple[str, ...]  # what is not as it was when the row was flown
+
+    @property
+    def digest(self) -> str:
+        """That of the row; empty when it failed without a log."""
+        return str(self.stored.row["digest"])
+
+    def file(self, name: str, overrides: Sequence[str] = ()) -> SettingsFile:
+        """The row as a settings file of that name, with overrides. Raises `SettingsError`."""
+        return overridden(SettingsFile(Path(name), {"flight": dict(self.settings)}, {}, {}), overrides)
+
+
+def recall(place: Place) -> Recalled:
+    """The row and its flight. Files that are gone or have changed come from the store. Raises `StoreError`."""
+    stored = find(*place)
+    settings = deepcopy(dict(stored.row["flight"]))
+    then: Mapping[str, str] = stored.version["content"]
+    track = settings["target"]["track"]
+    if track is not None and _hash(Path(track)) != then["target/track"]:
+        name = Path(track).name
+        settings["target"]["track"] = str(_unpacked(place.folder, {name: then["target/track"]}) / name)
+    settings["aircraft"] = _airframe(place.folder, settings["aircraft"], then)
+    flight = flight_from_document(settings)
+    now = version_of(flight)
+    changed = [name for name, digest in then.items() if now["content"].get(name) != digest]
+    changed += [name for name in now["content"] if name not in then]
+    changed += [name for name, value in now.items() if name != "content" and value != stored.version.get(name)]
+    return Recalled(stored, settings, flight, tuple(changed))
+
+
+class Again(NamedTuple):
+    """A row's flight, flown now."""
+
+    log: FlightLog
+    deviation: str  # from the row: the largest, in words; empty when they are equal to the last bit
+
+
+def fly_again(recalled: Recalled) -> Again:
+    """Flies the row's flight and compares. ValueError when it cannot start."""
+    log = simulate(recalled.flight)
+    return Again(log, deviation(recalled.stored.row, row_of(log), log))
+
+
+def deviation(then: Row, now: Row, log: FlightLog) -> str:
+    """By how much a flight is not the row's, in words: at its end, and in the metric that differs most."""
+    if then["digest"] == now["digest"]:
+        return ""
+    if then["outcome"] != now["outcome"]:
+        return f"it was {then['outcome']}, it is {now['outcome']}"
+    said = []
+    end = final(log)
+    apart = {name: abs(end[name] - x) for name, x in then["final"].items() if name in end}
+    if largest := max(apart, key=lambda name: apart[name] / (1.0 + abs(then["final"][name])), default=None):
+        said.append(f"{largest} at the end is {apart[largest]:.3g} off (SI)")
+    pairs = {name: (x, now["metrics"].get(name)) for name, x in then["metrics"].items()}
+    moved = {name: abs(a - b) / (abs(a) + abs(b)) for name, (a, b) in pairs.items() if None not in (a, b) and a != b}
+    if largest := max(moved, key=lambda name: moved[name], default=None):
+        before, after = pairs[largest]
+        said.append(f"{largest} was {before:.6g}, is {after:.6g}")
+    return ", ".join(said) or "within the flight, not at its end"
+
+
+def _airframe(folder: Path, name: str, then: Mapping[str, str]) -> str:
+    """The airframe of the row: by its name while its files are the same, else a folder unpacked from the store."""
+    kept = {n.removeprefix("aircraft/"): digest for n, digest in then.items() if n.startswith("aircraft/")}
+    try:
+        now = aircraft.folder(name)
+    except OSError:
+        if not kept:
+            return aircraft.names()[0]  # the flight had none
+    else:
+        paths = {n: aircraft.model(now) if n == "model" else now / n for n in kept}
+        if all(_hash(path) == kept[n] for n, path in paths.items()):
+            return name
+    called = Path(name).name
+    return str(_unpacked(folder, {f"{called}.xml" if n == "model" else n: d for n, d in kept.items()}, called))
+
+
+def _unpacked(folder: Path, files: Mapping[str, str], called: str = "files") -> Path:
+    """A temporary folder with these files of the store, until this process ends."""
+    temporary = tempfile.mkdtemp(prefix="standoff-harness-")
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+    unpacked = Path(temporary) / called
+    unpacked.mkdir()
+    for name, digest in files.items():
+        (unpacked / name).write_bytes(content(folder, digest))
+    return unpacked
+
+
+def _hash(path: Path) -> str | None:
+    try:
+        return content_hash(path.read_bytes())
+    except OSError:
+        return None

@@ -1,0 +1,161 @@
+"""The results of a run as one table: a row per flight, a column per setting and metric."""
+
+import json
+import math
+import os
+import sqlite3
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from harness.metrics import MEANING
+from harness.runs.store import reading
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+PARQUET = "flights.parquet"
+_LISTS_OF_TABLES = ("segments", "gusts")
+_AT_ONCE = 5000  # rows
+_FIRST = ("key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds")
+_STAND = b"journal_changes"  # in the Parquet file's metadata: how far the journal was
+
+
+def load_results(folder: Path | str) -> "pd.DataFrame":
+    """The flights of a run's directory, one row each, in the order of the matrix; also while it is written.
+
+    Columns: key, outcome, reason, digest, feasibility_margin_deg_s, seconds (wall time of the flight), run and version
+    (what decided it beside its settings: see `mixed_versions`); every setting by its dotted key below [flight] in file
+    units (lists are tuples, a list of tables is JSON text); every metric by its name, NaN for none.
+    Raises `harness.runs.store.StoreError`.
+    """
+    folder = Path(folder)
+    with reading(folder) as journal:
+        table = _exported(folder, _stand(journal))
+        if table is None:
+            table = _table(journal)
+    return _frame(table)
+
+
+def export(folder: Path) -> Path:
+    """Writes the table to flights.parquet, whole or not at all."""
+    import pyarrow.parquet as pq
+
+    path = folder / PARQUET
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        with reading(folder) as journal:
+            table = _table(journal).replace_schema_metadata({_STAND: _stand(journal)})
+        pq.write_table(table, partial)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+def _stand(journal: sqlite3.Connection) -> bytes:
+    ((number,),) = journal.execute("SELECT number FROM changes")
+    return str(number).encode()
+
+
+def _exported(folder: Path, stand: bytes) -> "pa.Table | None":
+    """What was exported, if nothing was flown since."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = folder / PARQUET
+    try:
+        if (pq.read_schema(path).metadata or {}).get(_STAND) == stand:
+            return pq.read_table(path)
+    except (OSError, pa.ArrowException):
+        return None  # none, or damaged: the journal has all of it
+    return None
+
+
+def _table(journal: sqlite3.Connection) -> "pa.Table":
+    import pyarrow as pa
+
+    parts = [pa.table(columns) for columns in _columns(journal)]
+    if not parts:
+        return pa.table({name: pa.array([], pa.string() if i < 4 else pa.float64()) for i, name in enumerate(_FIRST)})
+    table = pa.concat_tables(parts, promote_options="permissive")
+    for name in (*MEANING, *_FIRST[4:]):
+        if name in table.column_names:
+            table = table.set_column(table.column_names.index(name), name, table[name].cast(pa.float64()))
+    return table
+
+
+def _columns(journal: sqlite3.Connection) -> Iterator[dict[str, list[Any]]]:
+    """The rows, some thousands at a time, column by column."""
+    found = journal.execute(
+        "SELECT key, outcome, reason, digest, feasibility_margin_deg_s, seconds, run, version, settings, metrics "
+        "FROM flights ORDER BY position, key"
+    )
+    while rows := found.fetchmany(_AT_ONCE):
+        flat = [_flat(row) for row in rows]
+        names = dict.fromkeys(name for row in flat for name in row)
+        yield {name: [row.get(name) for row in flat] for name in names}
+
+
+def _flat(row: tuple[Any, ...]) -> dict[str, Any]:
+    *values, run, version, settings, metrics = row
+    flat = dict(zip(_FIRST, values, strict=True))
+    flat.update(run=run, version=version[:8])
+    flat.update(flat_settings(json.loads(settings)))
+    flat.update(json.loads(metrics))
+    return flat
+
+
+def flat_settings(settings: Mapping[str, Any], within: str = "") -> dict[str, Any]:
+    """Every setting by its dotted key. A list of tables is JSON text; infinity, a text in JSON, is a number again."""
+    flat: dict[str, Any] = {}
+    for key, value in settings.items():
+        if isinstance(value, Mapping):
+            flat.update(flat_settings(value, f"{within}{key}."))
+        elif key in _LISTS_OF_TABLES:
+            flat[within + key] = json.dumps(value)
+        else:
+            flat[within + key] = math.inf if value == "inf" else value
+    return flat
+
+
+def _frame(table: "pa.Table") -> "pd.DataFrame":
+    import pandas as pd
+    import pyarrow as pa
+
+    frame: pd.DataFrame = table.to_pandas()
+    for field in table.schema:
+        if pa.types.is_list(field.type):
+            tuples = [None if value is None else tuple(value.tolist()) for value in frame[field.name]]
+            frame[field.name] = pd.Series(tuples, index=frame.index, dtype=object)
+    return frame
+
+
+def mixed_versions(folder: Path) -> list[str]:
+    """What differs between flights of this directory that a comparison would mix, in sentences; empty when nothing.
+
+    Rows of the same law file, inner loop, airframe, target track, physics and libraries can be compared.
+    """
+    counts: dict[str, dict[str, int]] = {}
+    with reading(folder) as journal:
+        found = journal.execute(
+            "SELECT v.decides, json_extract(f.settings, '$.aircraft'), json_extract(f.settings, '$.target.track'), "
+            "count(*) FROM flights f JOIN versions v ON v.id = f.version GROUP BY 1, 2, 3"
+        ).fetchall()
+    for decides, airframe, track, count in found:
+        version = json.loads(decides)
+        for what, which in (*version.pop("content").items(), *version.items()):
+            if which is None:
+                continue
+            if what.startswith("aircraft/"):
+                what = f"{what} of {airframe}"
+            elif what == "target/track":
+                what = f"the track {track}"
+            of = counts.setdefault(what, {})
+            of[str(which)] = of.get(str(which), 0) + count
+    return [
+        f"{what} has {len(of)} versions, of {' and '.join(map(str, of.values()))} flights"
+        for what, of in counts.items()
+        if len(of) > 1
+    ]

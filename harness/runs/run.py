@@ -1,0 +1,168 @@
+"""A run: the flights of a matrix that are not done yet, flown by workers, kept in a store."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from harness.flight import Flight
+from harness.key import Identity, files, hashed, identity, version_of
+from harness.runs.estimate import Estimate
+from harness.runs.matrix import Matrix
+from harness.runs.provenance import provenance
+from harness.runs.row import failed_row
+from harness.runs.store import JOURNAL, Store, begun, examples, positions, reading
+from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task
+from harness.settings import SettingsError, flight_from_document
+
+RECORDED = 50  # flights: up to so many all are recorded, of more as many are chosen
+LOGS = ("all", "sample", "failed", "none")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How a matrix is flown; nothing here changes a result."""
+
+    workers: int
+    limit: int | None = None  # the first so many flights of the matrix
+    log: str | None = None  # one of LOGS; None: all up to `RECORDED`, else a sample
+    retry_failed: bool = False
+    timeout: float | None = None  # s for each flight; None: 20 times its estimate
+    fly: Fly = fly_task
+
+
+@dataclass(slots=True)
+class Progress:
+    """How far a run is. Flights."""
+
+    total: int
+    earlier: int = 0  # done by an earlier run
+    done: int = 0  # by this one, failed ones included
+    failed: int = 0
+    out: int = 0  # with the workers
+    outcomes: dict[str, int] = field(default_factory=dict)
+    reasons: dict[str, int] = field(default_factory=dict)  # of failures
+    recordings: list[str] = field(default_factory=list)  # what went wrong with them
+    seconds: float = 0.0  # since the first was sent out
+    ahead: float = 0.0  # s of one worker's time, estimated, for what is left
+
+
+class _Pending(NamedTuple):
+    of: Identity
+    flight: Flight
+
+
+def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
+    """Flies what is not done yet, and tells how far it is, a few times a second at least. The flights are valid.
+
+    Raises `StoreError` and `WorkersError`; whatever ends it, finished flights are kept.
+    """
+    with Store(folder) as store:
+        experiment = matrix.experiment
+        store.begin(provenance(matrix.file.path, experiment.title, experiment.question))
+        count = len(matrix)
+        progress = Progress(count if options.limit is None else min(count, options.limit))
+        pending: dict[str, _Pending] = {}
+        estimate = Estimate()
+        tasks = _tasks(matrix, store, options, progress, pending)
+        flying = fly_all(
+            tasks, folder, workers=options.workers, estimate=estimate, timeout=options.timeout, fly=options.fly
+        )
+        begin = time.monotonic()
+        try:
+            for done in flying:
+                if done is not None:
+                    _keep(store, done, pending.pop(done.task.key), progress)
+                store.tick()
+                progress.out, progress.seconds = len(pending), time.monotonic() - begin
+                yield progress
+        finally:
+            flying.close()
+        store.end()
+        yield progress
+
+
+def _keep(store: Store, done: Done, pending: _Pending, progress: Progress) -> None:
+    row = done.row
+    if row is None:
+        row = failed_row(pending.flight, pending.of, done.outcome, done.reason)
+    elif row["key"] != done.task.key:
+        raise WorkersError(
+            "a law, an airframe or a track has changed while flights were flown: run the same command again"
+        )
+    if problem := row.pop("recording", ""):
+        progress.recordings.append(problem)
+    store.add(row, pending.of.version, files(pending.flight), done.task.position)
+    progress.done += 1
+    progress.outcomes[done.outcome] = progress.outcomes.get(done.outcome, 0) + 1
+    if done.outcome.failed:
+        progress.failed += 1
+        reason = f"{done.outcome}: {done.reason}"
+        progress.reasons[reason] = progress.reasons.get(reason, 0) + 1
+
+
+def _tasks(
+    matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, _Pending]
+) -> Iterator[Task]:
+    """The flights to be flown, lazily."""
+    number = matrix.identifier
+    finished = positions_done(matrix, store.folder, retry_failed=options.retry_failed)
+    known = store.keys(failed=not options.retry_failed)
+    recorded = _recorded(matrix, options, progress.total)
+    flights = 0
+    for position in range(matrix.positions):
+        if flights >= progress.total:
+            return
+        if position in finished:
+            flights += 1
+            progress.earlier += 1
+            continue
+        combination = matrix.at(position)
+        if combination is None:
+            continue
+        flights += 1
+        flight = matrix.flight(combination)
+        of = identity(flight)
+        store.place(number, position, of.key)
+        if of.key in known:
+            progress.earlier += 1
+            continue
+        known.add(of.key)
+        pending[of.key] = _Pending(of, flight)
+        yield Task(of.key, position, flight, recorded(position))
+
+
+def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> frozenset[int]:
+    """The positions of the matrix whose flights are done, by the code and files of now; found without expanding it.
+
+    Raises `StoreError`.
+    """
+    if not (folder / JOURNAL).exists():
+        return frozenset()
+    with reading(folder) as journal:
+        if not begun(journal):
+            return frozenset()
+        current = []
+        for version, settings in examples(journal):
+            try:
+                now = version_of(flight_from_document(settings))
+            except (SettingsError, OSError):
+                continue  # its files are gone
+            if hashed(now) == version:
+                current.append(version)
+        return frozenset(positions(journal, matrix.identifier, current, failed=not retry_failed))
+
+
+def _recorded(matrix: Matrix, options: Options, total: int) -> Callable[[int], str]:
+    """When the flight at a position is recorded: all | failed | none.
+
+    A sample is whole groups of flights that differ in the plant alone, evenly spread over the matrix.
+    """
+    log = options.log or ("all" if total <= RECORDED else "sample")
+    if log != "sample":
+        return lambda position: log
+    plants = max((len(a.values) for block in matrix.blocks for a in block.axes if a.keys == ("plant",)), default=1)
+    groups, wanted = -(-total // plants), max(1, RECORDED // plants)
+    stride = -(-groups // wanted)
+    return lambda position: "all" if matrix.group(position) % stride == 0 else "none"

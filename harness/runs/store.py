@@ -1,0 +1,290 @@
+"""The store: one SQLite journal in a run's directory, with one writer."""
+
+import json
+import os
+import socket
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+from harness.key import content_hash, hashed
+from harness.plant import Outcome
+from harness.runs.provenance import Provenance, now
+from harness.runs.row import Row
+
+JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
+COMMIT_EVERY = 0.5  # s
+_APPLICATION = 0x53544F46  # "STOF", in the file's header
+_FORMAT = 1
+_WAIT = 60.0  # s, for a reader to finish
+
+_TABLES = f"""
+CREATE TABLE runs (id INTEGER PRIMARY KEY, {", ".join(Provenance._fields)}, ended);
+CREATE TABLE files (hash TEXT PRIMARY KEY, content BLOB NOT NULL);
+CREATE TABLE versions (id TEXT PRIMARY KEY, decides TEXT NOT NULL);
+CREATE TABLE flights (
+    key TEXT PRIMARY KEY, run INTEGER NOT NULL, position INTEGER NOT NULL, version TEXT NOT NULL,
+    outcome TEXT NOT NULL, reason TEXT NOT NULL, digest TEXT NOT NULL, settings TEXT NOT NULL, metrics TEXT NOT NULL,
+    feasibility_margin_deg_s REAL, seconds REAL, final TEXT NOT NULL
+);
+CREATE TABLE positions (
+    matrix TEXT NOT NULL, position INTEGER NOT NULL, key TEXT NOT NULL, PRIMARY KEY (matrix, position)
+) WITHOUT ROWID;
+CREATE TABLE changes (number INTEGER NOT NULL);
+INSERT INTO changes VALUES (0);
+PRAGMA application_id = {_APPLICATION};
+PRAGMA user_version = {_FORMAT};
+"""
+_FAILURES = tuple(outcome.value for outcome in Outcome if outcome.failed)
+_FAILED = f"outcome IN ({', '.join(repr(value) for value in _FAILURES)})"
+
+
+class StoreError(Exception):
+    """The directory cannot be used: why, in one line."""
+
+
+class Stored(NamedTuple):
+    """A row as it is kept."""
+
+    row: Row  # as `fly --json` prints it, and `seconds`, `final`
+    version: Mapping[str, Any]  # what decided it beside its settings: see `harness.key`
+    run: Mapping[str, Any]  # the provenance, and when the run ended
+
+
+class Store:
+    """The journal, open for writing by this process alone. A context: what is left is committed at its end."""
+
+    def __init__(self, folder: Path) -> None:
+        """Makes the directory where there is none. Raises `StoreError`."""
+        self.folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(folder / LOCK)
+        except OSError as error:
+            raise StoreError(f"{folder}: cannot be written: {error.strerror or error}") from None
+        try:
+            with told(folder):
+                fresh = not (folder / JOURNAL).exists()
+                self._journal = sqlite3.connect(folder / JOURNAL, timeout=_WAIT, isolation_level=None)
+                if not fresh:
+                    _check(self._journal, folder, whole=True)
+                if not begun(self._journal):
+                    self._journal.executescript(f"BEGIN; {_TABLES} COMMIT;")
+        except BaseException:
+            os.close(self._lock)
+            raise
+        self._begun: float | None = None  # when the first change was made that is not committed yet
+        self._versions: set[str] = {i for (i,) in self._all("SELECT id FROM versions")}
+        self._run = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None or not issubclass(kind, StoreError):
+                self.commit()
+        finally:
+            self._journal.close()
+            os.close(self._lock)
+
+    def begin(self, of: Provenance) -> None:
+        """A run begins: rows from now on are its."""
+        self._change(f"INSERT INTO runs VALUES (NULL, {', '.join('?' * len(of))}, NULL)", of)
+        ((self._run,),) = self._all("SELECT max(id) FROM runs")
+        self.commit()
+
+    def end(self) -> None:
+        """The run has ended, with all its flights or not."""
+        self._change("UPDATE runs SET ended = ? WHERE id = ?", (now(), self._run))
+        self.commit()
+
+    def add(self, row: Row, version: Mapping[str, Any], files: Mapping[str, Path], position: int) -> None:
+        """Keeps a row, for good within half a second; `files` are those that `version` has hashes of."""
+        number = hashed(version)
+        if number not in self._versions:
+            for name, path in files.items():
+                content = path.read_bytes()
+                if content_hash(content) != version["content"][name]:
+                    raise StoreError(f"{path}: has changed while flights were flown: run the same command again")
+                self._change("INSERT OR IGNORE INTO files VALUES (?, ?)", (version["content"][name], content))
+            self._change("INSERT INTO versions VALUES (?, ?)", (number, json.dumps(version)))
+            self._versions.add(number)
+        self._change(
+            "INSERT OR REPLACE INTO flights VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (
+                row["key"], self._run, position, number, row["outcome"], row["reason"], row["digest"],
+                json.dumps(row["flight"]), json.dumps(row["metrics"]), row["feasibility_margin_deg_s"],
+                row.get("seconds"), json.dumps(row.get("final", {})),
+            ),
+        )  # fmt: skip
+
+    def place(self, matrix: str, position: int, key: str) -> None:
+        """Remembers that this position of a matrix is that flight."""
+        self._change("INSERT OR REPLACE INTO positions VALUES (?, ?, ?)", (matrix, position, key))
+
+    def keys(self, *, failed: bool = True) -> set[str]:
+        """The flights that are done; without the failed ones when they are to be flown again."""
+        return {key for (key,) in self._all("SELECT key FROM flights" + ("" if failed else f" WHERE NOT {_FAILED}"))}
+
+    def commit(self) -> None:
+        """Writes what is not written yet."""
+        if self._begun is not None:
+            with told(self.folder):
+                self._journal.execute("UPDATE changes SET number = number + 1")
+                self._journal.execute("COMMIT")
+            self._begun = None
+
+    def tick(self) -> None:
+        """Commits what has waited long enough."""
+        if self._begun is not None and time.monotonic() - self._begun >= COMMIT_EVERY:
+            self.commit()
+
+    def _change(self, statement: str, values: Iterable[object]) -> None:
+        with told(self.folder):
+            if self._begun is None:
+                self._journal.execute("BEGIN IMMEDIATE")
+                self._begun = time.monotonic()
+            self._journal.execute(statement, tuple(values))
+        self.tick()
+
+    def _all(self, statement: str, values: Iterable[object] = ()) -> list[Any]:
+        with told(self.folder):
+            return self._journal.execute(statement, tuple(values)).fetchall()
+
+
+@contextmanager
+def reading(folder: Path) -> Iterator[sqlite3.Connection]:
+    """The journal, to be read only, also while a run writes it. Raises `StoreError`."""
+    path = folder / JOURNAL
+    if not path.is_file():
+        raise StoreError(f"{folder}: holds no results of `harness run` (there is no {JOURNAL})")
+    with told(folder):
+        # Opened for writing where that is allowed: a run that was killed left half a commit, to be rolled back first.
+        mode = "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
+        journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=_WAIT)
+        try:
+            journal.execute("PRAGMA query_only = ON")
+            _check(journal, folder, whole=False)
+            yield journal
+        finally:
+            journal.close()
+
+
+def begun(journal: sqlite3.Connection) -> bool:
+    """Whether it has its tables: a run may have been killed before it made them."""
+    return bool(journal.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+
+
+def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
+    """Each version in the store, with the settings of one flight of it."""
+    rows = journal.execute("SELECT version, settings, min(rowid) FROM flights GROUP BY version")
+    return [(version, json.loads(settings)) for version, settings, _ in rows]
+
+
+def positions(journal: sqlite3.Connection, matrix: str, versions: Sequence[str], *, failed: bool) -> set[int]:
+    """The positions of a matrix whose flight is done in one of these versions; without failed ones if so asked."""
+    rows = journal.execute(
+        "SELECT p.position FROM positions p JOIN flights f USING (key) "
+        f"WHERE p.matrix = ? AND f.version IN ({', '.join('?' * len(versions))})"
+        + ("" if failed else f" AND NOT {_FAILED}"),
+        (matrix, *versions),
+    )
+    return {position for (position,) in rows}
+
+
+def find(folder: Path, beginning: str) -> Stored:
+    """The one row whose key begins so. Raises `StoreError`."""
+    with reading(folder) as journal:
+        journal.row_factory = sqlite3.Row
+        found = journal.execute(
+            "SELECT f.*, v.decides FROM flights f JOIN versions v ON v.id = f.version "
+            "WHERE substr(f.key, 1, ?) = ? ORDER BY f.key LIMIT 6",
+            (len(beginning), beginning),
+        ).fetchall()
+        if not found or not beginning:
+            raise StoreError(f"{folder}: no flight has a key that begins with {beginning!r}")
+        if len(found) > 1:
+            keys = ", ".join(row["key"] for row in found[:5]) + (", ..." if len(found) > 5 else "")
+            raise StoreError(f"{folder}: the key {beginning!r} is ambiguous: {keys}")
+        kept = dict(found[0])
+        run = dict(journal.execute("SELECT * FROM runs WHERE id = ?", (kept["run"],)).fetchone())
+    row = {
+        "key": kept["key"],
+        "outcome": kept["outcome"],
+        "reason": kept["reason"],
+        "digest": kept["digest"],
+        "flight": json.loads(kept["settings"]),
+        "metrics": json.loads(kept["metrics"]),
+        "feasibility_margin_deg_s": kept["feasibility_margin_deg_s"],
+        "seconds": kept["seconds"],
+        "final": json.loads(kept["final"]),
+    }
+    return Stored(row, json.loads(kept["decides"]), run)
+
+
+def content(folder: Path, digest: str) -> bytes:
+    """A file that a flight read, by its hash. Raises `StoreError`."""
+    with reading(folder) as journal:
+        found = journal.execute("SELECT content FROM files WHERE hash = ?", (digest,)).fetchone()
+    if found is None:
+        raise StoreError(f"{folder}: a file that the flight read is not in the store")
+    return bytes(found[0])
+
+
+@contextmanager
+def told(folder: Path) -> Iterator[None]:
+    """SQLite's errors as a `StoreError` that says what to do."""
+    try:
+        yield
+    except sqlite3.DatabaseError as error:
+        name = getattr(error, "sqlite_errorname", "") or ""
+        path = folder / JOURNAL
+        if name.startswith("SQLITE_FULL"):
+            why = f"{folder}: the disk is full: finished flights are kept; make room, then run the same command"
+        elif name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
+            why = f"{path}: cannot be written: {error}"
+        elif name.startswith("SQLITE_IOERR"):
+            why = f"{path}: {error}: finished flights are kept; when the disk is sound, run the same command"
+        elif name.startswith("SQLITE_BUSY"):
+            why = f"{path}: another process has held it for {_WAIT:g} s"
+        else:
+            why = f"{path}: is damaged, or no journal of the harness ({error}): nothing was changed; move it away"
+        raise StoreError(why) from None
+
+
+def _check(journal: sqlite3.Connection, folder: Path, *, whole: bool) -> None:
+    """Whether it is a journal of this format, and, asked for the whole of it, undamaged."""
+    ((application,),) = journal.execute("PRAGMA application_id")
+    ((version,),) = journal.execute("PRAGMA user_version")
+    path = folder / JOURNAL
+    if not application and not begun(journal):
+        return
+    if application != _APPLICATION:
+        raise StoreError(f"{path}: is no journal of the harness: nothing was changed; move it away")
+    if version != _FORMAT:
+        raise StoreError(f"{path}: has format {version}, this harness reads format {_FORMAT}: use another directory")
+    if whole and (damage := journal.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
+        raise StoreError(f"{path}: is damaged ({damage}): nothing was changed; move it away")
+
+
+def _locked(path: Path) -> int:
+    """The open lock file. The operating system lets go of the lock when the process ends, however it ends."""
+    import fcntl
+
+    lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        by = os.read(lock, 200).decode(errors="replace").strip()
+        os.close(lock)
+        raise StoreError(f"{path.parent}: another run writes there ({by}): wait for it, or use another --out") from None
+    os.ftruncate(lock, 0)
+    os.write(lock, f"process {os.getpid()} on {socket.gethostname()} since {now()}\n".encode())
+    return lock

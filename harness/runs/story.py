@@ -1,0 +1,73 @@
+"""A row of a run told in words."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from harness.commands.telling import number
+from harness.metrics import MEANING
+from harness.runs.recordings import recording_path
+from harness.runs.results import flat_settings
+from harness.runs.store import Stored
+from harness.settings import document, flight_from_document
+
+_ENDED = {
+    "completed": "It flew to its end.",
+    "ground": "It ended on the ground",
+    "departed": "It departed from controlled flight",
+    "target_lost": "It lost the target",
+    "invalid": "It failed: what it computed is not valid",
+    "timeout": "It failed: it took too long",
+    "worker_died": "It failed: the process that flew it died",
+}
+
+
+def story(folder: Path, stored: Stored) -> Iterator[str]:
+    """Settings, metrics, end and origin, in lines."""
+    row, run, settings = stored.row, stored.run, stored.row["flight"]
+    law, wind = settings["law"], settings["wind"]["steady_mps"]
+    yield f"flight {row['key']}"
+    if run["title"]:
+        yield f"of {run['title']!r}: {run['question']}"
+    what = settings["plant"] if settings["plant"] == "kinematic" else f"{settings['plant']} {settings['aircraft']}"
+    air = f"in wind of {wind[0]:g} m/s north, {wind[1]:g} m/s east" if any(wind) else "in still air"
+    yield (
+        f"{law['name']} ({law['gains']}) on {what}, {settings['duration_s']:g} s {air}, seed {settings['seed']}, "
+        f"to circle at {law['standoff_m']:g} m with {law['max_heading_rate_deg_s']} deg/s at most"
+    )
+    margin = row["feasibility_margin_deg_s"]
+    if margin is not None:
+        yield f"The circle is {'feasible' if margin >= 0 else 'INFEASIBLE'}, by a margin of {margin:+.2f} deg/s."
+    reason = f": {row['reason']}." if row["reason"] else ""
+    yield f"{_ENDED[row['outcome']]}{reason}"
+    converged = row["metrics"]["convergence_time_s"]
+    if row["outcome"] == "completed":
+        tolerance = settings["metrics"]["tolerance_m"]
+        yield (
+            f"It settled to {tolerance:g} m in {converged:g} s."
+            if converged is not None
+            else f"It did not settle to {tolerance:g} m."
+        )
+    yield ""
+    for name, value in row["metrics"].items():
+        yield f"  {name:30}{number(value):>9}  {MEANING.get(name, '')}"
+    yield ""
+    yield "settings that are not the default's:"
+    flat = flat_settings(settings)
+    usual = flat_settings(document(flight_from_document({"plant": settings["plant"], "law": {"name": law["name"]}})))
+    for name, value in flat.items():
+        if name in ("plant", "law.name") or value != usual.get(name):
+            yield f"  {name} = {json.dumps(value)}"
+    yield ""
+    dirty = {None: "", 0: "", 1: ", with changes"}[run["git_dirty"]]
+    yield f"flown by: {run['command']}"
+    yield f"at {run['started']}, commit {run['git_commit'] or 'unknown'}{dirty}"
+    yield f"on {run['platform']}, Python {run['python']}"
+    if row["seconds"] is not None:
+        yield f"in {row['seconds']:.3g} s; digest {row['digest'] or 'none'}"
+    path = recording_path(folder, row["key"])
+    yield (
+        f"recording: {path}"
+        if path.is_file()
+        else f"to record it: harness fly {folder}:{row['key'][:8]} --rrd flight.rrd"
+    )

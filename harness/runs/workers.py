@@ -1,0 +1,277 @@
+"""Worker processes: they fly what they are given, and what one of them loses is one flight.
+
+Flights go out in chunks, since a kinematic one takes little longer than a message. Each worker notes in shared memory
+which flight of its chunk it is at and since when, so a death or a hang costs that flight alone: the rest of its chunk
+is flown again.
+"""
+
+import multiprocessing
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pebble import ProcessExpired, ProcessPool
+
+from harness.flight import Flight
+from harness.plant import Outcome
+from harness.runs.estimate import CHUNK, Estimate
+from harness.runs.row import Row, flown
+
+THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+AHEAD = 2  # chunks per worker that are sent out: one in flight, one waiting
+SHORTEST_TIMEOUT = 10.0  # s: below it, a busy machine would decide which flights hang
+_RECORDING = 60.0  # s, that writing a recording may take besides
+_RESTARTS = 3  # of the pool or of a chunk's worker, without any flight done in between
+_NONE = -1.0
+
+
+class WorkersError(Exception):
+    """The workers cannot fly: why, in one line."""
+
+
+class Task(NamedTuple):
+    """A flight to be flown."""
+
+    key: str
+    position: int
+    flight: Flight
+    record: str  # when to write a recording: all | failed | none
+
+
+class Done(NamedTuple):
+    """A flight that was flown: its row, or the failure that took the row's place."""
+
+    task: Task
+    row: Row | None
+    outcome: Outcome
+    reason: str = ""
+
+
+Fly = Callable[[Task, Path], Row]
+
+
+def fly_task(task: Task, folder: Path) -> Row:
+    """In a worker: flies it, and writes its recording when asked to."""
+    row, log = flown(task.flight)
+    if task.record == "all" or (task.record == "failed" and log.outcome is not Outcome.COMPLETED):
+        from harness.runs.recordings import record
+
+        row["recording"] = record(log, row, folder)  # what went wrong, if anything
+    return row
+
+
+@dataclass(slots=True)
+class _Chunk:
+    tasks: Sequence[Task]
+    slot: int  # its place in the shared memory
+    deaths: int = 0  # of workers before they began its first flight
+    hung: bool = False
+    future: Future[list[Row | str]] | None = None
+
+
+def fly_all(
+    tasks: Iterator[Task],
+    folder: Path,
+    *,
+    workers: int,
+    estimate: Estimate,
+    timeout: float | None = None,
+    fly: Fly = fly_task,
+) -> Generator[Done | None]:
+    """Flies the tasks, a few chunks ahead of what is done; None now and then when nothing has come in.
+
+    Without workers they are flown in this process, one by one, and nothing is timed. Closing the generator ends every
+    worker at once.
+    """
+    if not workers:
+        for task in tasks:
+            yield _done(task, fly(task, folder))
+        return
+    yield from _Flying(tasks, folder, workers, estimate, timeout, fly).results()
+
+
+class _Flying:
+    """The state of `fly_all`."""
+
+    def __init__(
+        self, tasks: Iterator[Task], folder: Path, workers: int, estimate: Estimate, timeout: float | None, fly: Fly
+    ) -> None:
+        self.tasks, self.folder, self.workers, self.timeout, self.fly = tasks, folder, workers, timeout, fly
+        self.estimate = estimate
+        self.again: deque[_Chunk] = deque()  # to be flown again
+        self.out: dict[Future[list[Row | str]], _Chunk] = {}
+        # For each slot: the number of the flight in its chunk, and since when (the monotonic clock is the machine's).
+        # A worker that is being ended may still write to its slot: there are enough to use that one last.
+        slots = 16 * AHEAD * workers
+        self.begun = multiprocessing.get_context("spawn").RawArray("d", 2 * slots)
+        self.slots = deque(range(slots))
+        self.pool = self._pool()
+        self.restarts = 0
+
+    def results(self) -> Iterator[Done | None]:
+        try:
+            while self._send() or self.out:
+                self._end_hung()
+                done, _ = wait(self.out, timeout=0.1, return_when=FIRST_COMPLETED)
+                if not done:
+                    yield None
+                for future in done:
+                    yield from self._received(self.out.pop(future))
+        finally:
+            self._stop()
+
+    def _pool(self) -> ProcessPool:
+        for name in THREADS:  # before spawn: a library reads it when it is loaded
+            os.environ.setdefault(name, "1")
+        return ProcessPool(
+            self.workers,
+            initializer=_prepare,
+            initargs=(self.begun, self.folder, self.fly),
+            context=multiprocessing.get_context("spawn"),
+        )
+
+    def _stop(self) -> None:
+        self.pool.stop()  # type: ignore[no-untyped-call]
+        for child in multiprocessing.active_children():
+            if child.name == "pebble_pool_worker":
+                child.kill()
+        self.pool.join()
+
+    def _send(self) -> bool:
+        """Keeps the workers busy; whether there was anything to send."""
+        sent = False
+        while len(self.out) < AHEAD * self.workers:
+            chunk = self.again.popleft() if self.again else self._next_chunk()
+            if chunk is None:
+                break
+            chunk.slot = self.slots.popleft()
+            self.begun[2 * chunk.slot] = _NONE
+            try:
+                chunk.future = self.pool.schedule(_fly_chunk, args=(chunk.slot, chunk.tasks))
+            except RuntimeError:  # the pool broke since
+                self.slots.append(chunk.slot)
+                self.again.appendleft(chunk)
+                self._restart()
+                continue
+            self.out[chunk.future] = chunk
+            sent = True
+        return sent
+
+    def _next_chunk(self) -> _Chunk | None:
+        tasks: list[Task] = []
+        seconds = 0.0
+        while seconds < CHUNK and (task := next(self.tasks, None)) is not None:
+            tasks.append(task)
+            seconds += self.estimate.seconds(task.flight)
+        return _Chunk(tasks, 0) if tasks else None
+
+    def _end_hung(self) -> None:
+        """Has workers killed whose flight takes too long."""
+        for chunk in self.out.values():
+            number, since = self.begun[2 * chunk.slot : 2 * chunk.slot + 2]
+            if number == _NONE or chunk.hung:
+                continue
+            if time.monotonic() - since > self._limit(chunk.tasks[int(number)]):
+                chunk.hung = True
+                assert chunk.future
+                chunk.future.cancel()  # Pebble ends the worker of a cancelled task that runs
+
+    def _limit(self, task: Task) -> float:
+        limit = self.timeout or max(SHORTEST_TIMEOUT, 20.0 * self.estimate.seconds(task.flight))
+        return limit + (_RECORDING if task.record != "none" else 0.0)
+
+    def _received(self, chunk: _Chunk) -> Iterator[Done]:
+        assert chunk.future
+        self.slots.append(chunk.slot)
+        try:
+            rows = chunk.future.result()
+        except (CancelledError, ProcessExpired, BrokenProcessPool) as error:
+            yield from self._lost(chunk, error)
+            return
+        self.restarts = 0
+        for task, row in zip(chunk.tasks, rows, strict=True):
+            if isinstance(row, str):
+                yield Done(task, None, Outcome.INVALID, row)
+            else:
+                self.estimate.learn(task.flight, row["seconds"])
+                yield _done(task, row)
+
+    def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:
+        """The worker of the chunk died or was ended, or all of them are gone."""
+        number = self.begun[2 * chunk.slot]
+        rest = list(chunk.tasks)
+        if isinstance(error, BrokenProcessPool):
+            self._restart()
+        elif number == _NONE:  # died between two flights: nobody's fault, but not for ever
+            chunk.deaths += 1
+            if chunk.deaths > _RESTARTS:
+                raise WorkersError(f"workers die before they can fly: {error}")
+        else:
+            task = rest.pop(int(number))
+            self.restarts = 0
+            if chunk.hung:
+                yield Done(task, None, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
+            else:
+                code = getattr(error, "exitcode", None)
+                yield Done(task, None, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
+        if rest:
+            self.again.append(_Chunk(rest, 0, chunk.deaths))
+
+    def _restart(self) -> None:
+        if self.pool.active:
+            return
+        self.restarts += 1
+        if self.restarts > _RESTARTS:
+            raise WorkersError("the worker processes end as soon as they are started")
+        self._stop()
+        self.pool = self._pool()
+
+
+def _done(task: Task, row: Row) -> Done:
+    return Done(task, row, Outcome(row["outcome"]), row["reason"])
+
+
+# In a worker
+
+_SHARED: dict[str, Any] = {}  # what its pool gave this process when it began
+
+
+def _prepare(begun: Any, folder: Path, fly: Fly) -> None:
+    _SHARED.update(begun=begun, folder=folder, fly=fly)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed ends at once: nobody waits for its flight."""
+    parent = multiprocessing.parent_process()
+    assert parent
+    parent.join()
+    os._exit(1)
+
+
+def _fly_chunk(slot: int, tasks: Sequence[Task]) -> list[Row | str]:
+    """The row of each task, or what went wrong with it."""
+    begun, folder, fly = _SHARED["begun"], _SHARED["folder"], _SHARED["fly"]
+    rows: list[Row | str] = []
+    for number, task in enumerate(tasks):
+        begun[2 * slot + 1] = time.monotonic()
+        begun[2 * slot] = float(number)
+        try:
+            rows.append(fly(task, folder))
+        except Exception as error:  # a fault of the harness, or a file gone: of this flight, not of the others
+            rows.append(f"it could not be flown: {type(error).__name__}: {error}")
+    begun[2 * slot] = _NONE
+    return rows
