@@ -1,0 +1,185 @@
+"""A matrix of flights as a file describes it."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from harness.runs.matrix import Matrix, read_matrix
+from harness.runs.survey import survey
+from harness.settings import SettingsError, read_settings
+
+FLIGHT = """\
+[flight]
+plant = "kinematic"
+duration_s = 1.0
+[flight.law]
+name = "nftsm"
+gains = "paper_1"
+"""
+
+
+@pytest.fixture
+def matrix(tmp_path):
+    def made(text: str, *overrides: str) -> Matrix:
+        path = tmp_path / "m.toml"
+        path.write_text(FLIGHT + text, encoding="utf-8")
+        return read_matrix(read_settings(path, overrides))
+
+    return made
+
+
+def values(matrix: Matrix, key: str) -> list[object]:
+    return [combination.values[key] for combination in matrix.combinations()]
+
+
+def test_a_matrix_is_the_product_of_its_axes_with_the_plant_fastest(matrix) -> None:
+    m = matrix('[matrix]\nplant = ["kinematic", "sixdof"]\n"law.gains" = ["paper", "paper_1"]\nseed = [3, 4]\n')
+    assert len(m) == 8
+    assert [tuple(c.values[k] for k in ("law.gains", "seed", "plant")) for c in m.combinations()][:3] == [
+        ("paper", 3, "kinematic"),
+        ("paper", 3, "sixdof"),
+        ("paper", 4, "kinematic"),
+    ]
+
+
+def test_expansion_is_the_same_when_built_twice_and_is_lazy(matrix) -> None:
+    text = (
+        '[matrix]\nplant = ["kinematic", "sixdof"]\n"start.heading_deg" = { uniform = [0.0, 360.0] }\n'
+        "seed = { start = 0, count = 1000000 }\n"
+    )
+    one, two = matrix(text).combinations(), matrix(text).combinations()
+    for _ in range(50):
+        assert next(one) == next(two)
+    m = matrix(text)
+    assert m.at(1_999_998) is not None
+    assert m.at(1_999_998).values["seed"] == 999_999
+
+
+def test_forms_give_their_values(matrix) -> None:
+    m = matrix("[matrix]\nseed = { start = 5, count = 3 }\n")
+    assert values(m, "seed") == [5, 6, 7]
+    m = matrix('[matrix]\n"law.max_heading_rate_deg_s" = { from = 5, to = 30, step = 5 }\n')
+    assert values(m, "law.max_heading_rate_deg_s") == [5, 10, 15, 20, 25, 30]
+    m = matrix("[matrix]\nduration_s = { from = 0.1, to = 0.5, step = 0.1 }\n")
+    assert values(m, "duration_s") == [0.1, 0.2, 0.3, 0.4, 0.5]
+    m = matrix("[matrix]\nduration_s = { from = 3, to = 1, step = -1 }\n")
+    assert values(m, "duration_s") == [3, 2, 1]
+    m = matrix('[matrix]\n"wind.steady_mps" = { speed_mps = [0, 2], towards_deg = [0, 90, 180] }\n')
+    assert values(m, "wind.steady_mps") == [[0, 0], [2, 0], [0, 2], [-2, 0]]
+
+
+def test_a_drawn_value_is_the_seeds_own_whatever_the_plant_law_or_place(matrix) -> None:
+    drawn = '"start.heading_deg" = { uniform = [10.0, 20.0] }\n"start.position_m" = { normal = [[0, 0], [5, 50]] }\n'
+    m = matrix(f'[matrix]\nplant = ["kinematic", "sixdof"]\n"law.gains" = ["paper", "paper_1"]\n{drawn}seed = [0, 7]\n')
+    by_seed: dict[object, set[object]] = {}
+    for c in m.combinations():
+        by_seed.setdefault(c.values["seed"], set()).add(repr([c.values[k] for k in m.draws]))
+    assert {seed: len(found) for seed, found in by_seed.items()} == {0: 1, 7: 1}
+    assert by_seed[0] != by_seed[7]
+    alone = matrix(f"[matrix]\nseed = [7]\n{drawn}")
+    assert {repr([c.values[k] for k in m.draws]) for c in alone.combinations()} == by_seed[7]
+    headings = values(matrix(f"[matrix]\n{drawn}seed = {{ start = 0, count = 400 }}\n"), "start.heading_deg")
+    assert all(10.0 <= heading < 20.0 for heading in headings)
+    assert sum(headings) / 400 == pytest.approx(15.0, abs=3 * 10 / 12**0.5 / 20)
+
+
+def test_keys_with_a_comma_vary_together(matrix) -> None:
+    m = matrix('[matrix]\n"aircraft, start.airspeed_mps" = [["ultra_stick_25e", 13.0], ["aerosonde", 25.0]]\n')
+    flights = [m.flight(c) for c in m.combinations()]
+    assert [(f.aircraft, f.start.airspeed) for f in flights] == [("ultra_stick_25e", 13.0), ("aerosonde", 25.0)]
+
+
+def test_excluded_flights_are_left_out_and_included_ones_added(matrix) -> None:
+    m = matrix(
+        '[matrix]\nplant = ["kinematic", "sixdof"]\nlaw.gains = ["paper", "paper_1"]\nseed = { start = 0, count = 2 }\n'
+        '[[exclude]]\nplant = "sixdof"\nlaw.gains = "paper_1"\n'
+        '[[include]]\nlaw.name = "smc"\nlaw.gains = "paper"\nseed = { start = 0, count = 3 }\n'
+    )
+    flights = [m.flight(c) for c in m.combinations()]
+    assert len(m) == len(flights) == 9
+    assert Counter((f.plant, type(f.law).__name__, f.law.gains) for f in flights) == {
+        ("kinematic", "Nftsm", "paper"): 2,
+        ("sixdof", "Nftsm", "paper"): 2,
+        ("kinematic", "Nftsm", "paper_1"): 2,
+        ("kinematic", "Smc", "paper"): 3,
+    }
+
+
+def test_a_key_that_is_set_is_no_axis(matrix) -> None:
+    m = matrix('[matrix]\nplant = ["kinematic", "sixdof"]\nseed = [1, 2]\n', "plant=sixdof")
+    assert [(m.flight(c).plant, m.flight(c).seed) for c in m.combinations()] == [("sixdof", 1), ("sixdof", 2)]
+
+
+def test_flights_that_differ_in_the_plant_alone_are_one_group(matrix) -> None:
+    m = matrix('[matrix]\nplant = ["kinematic", "sixdof"]\n"law.gains" = ["paper", "paper_1"]\nseed = [0, 1]\n')
+    groups: dict[int, list[object]] = {}
+    for c in m.combinations():
+        groups.setdefault(m.group(c.position), []).append((c.values["law.gains"], c.values["seed"]))
+    assert sorted(groups) == [0, 1, 2, 3]
+    assert all(len(members) == 2 and members[0] == members[1] for members in groups.values())
+
+
+MISTAKES = [
+    ("[matrix]\nseed = { start = 0, conut = 3 }\n", "m.toml:8: matrix.seed: has the keys conut, start, must be a list"),
+    ("[matrix]\nseed = 3\n", "m.toml:8: matrix.seed: is 3, must be a list"),
+    ("[matrix]\nseed = []\n", "m.toml:8: matrix.seed: the list is empty"),
+    ("[matrix]\nduration_s = { from = 1, to = 2, step = -1 }\n", "m.toml:8: matrix.duration_s: step is -1"),
+    ('[matrix]\n"start.heading_deg" = { uniform = [1] }\n', "m.toml:8: matrix.start.heading_deg: uniform is [1]"),
+    ('[matrix]\n"seed, plant" = [[1, "sixdof"], [2]]\n', "element 2 is [2], must be a list of 2: seed, plant"),
+    (
+        '[matrix]\nseed = [1]\n"seed, plant" = [[1, "sixdof"]]\n',
+        "m.toml:9: matrix.seed, plant: seed is an axis already",
+    ),
+    ('[matrix]\nseed = [1]\n[[exclude]]\nplant = "sixdof"\n', "m.toml:10: exclude.plant: is no axis of [matrix]"),
+    ("[matrix]\nseed = [1]\n[[exclude]]\nseed = 2\n", "m.toml:10: exclude.seed: excludes nothing: 2 is none of 1"),
+]
+
+
+@pytest.mark.parametrize(("text", "told"), MISTAKES)
+def test_a_mistake_in_the_matrix_is_told_with_its_line(matrix, text: str, told: str) -> None:
+    with pytest.raises(SettingsError) as caught:
+        matrix(text)
+    assert len(caught.value.lines) == 1
+    assert told in caught.value.lines[0]
+
+
+WRONG_FLIGHTS = [
+    ('[matrix]\n"law.gain" = ["paper"]\n', "m.toml:8: flight.law.gain: unknown key"),
+    ('[matrix]\n"law.gains" = [\n  "paper",\n  "papr",\n]\n', 'm.toml:10: flight.law.gains: is "papr"'),
+    ('[matrix]\nplant = ["sixdof"]\n"start.airspeed_mps" = [13, 7]\n', "m.toml:9: flight.start.airspeed_mps: no"),
+    ("[matrix]\nseed = [0, -1]\n", "m.toml:8: flight.seed: is -1"),
+    (
+        '[matrix]\nseed = [0, 1]\n"wind.steady_mps" = { normal = [[0, 0], [9, 9]] }\n',
+        "m.toml:9: flight.wind.steady_mps",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "told"), WRONG_FLIGHTS)
+def test_a_flight_that_is_wrong_is_found_before_flying(matrix, text: str, told: str) -> None:
+    with pytest.raises(SettingsError) as caught:
+        list(survey(matrix(text)))
+    assert told in str(caught.value)
+
+
+def test_the_survey_counts_and_tells_idle_seeds(matrix) -> None:
+    text = '[matrix]\nseed = { start = 0, count = 3 }\n"law.max_heading_rate_deg_s" = [1.0, 5.0]\n'
+    *_, found = survey(matrix(text))
+    assert (found.flights, found.infeasible, found.idle_seeds) == (6, 3, 3)
+    assert found.varies == {"seed": 3, "law.max_heading_rate_deg_s": 2}
+    *_, noisy = survey(matrix(text, "estimator.kind=ekf"))
+    *_, drawn = survey(matrix(text + '"start.heading_deg" = { uniform = [0, 9] }\n'))
+    assert noisy.idle_seeds == drawn.idle_seeds == 0
+    *_, limited = survey(matrix(text), limit=4)
+    assert limited.flights == 4
+
+
+def test_a_file_without_a_matrix_is_one_flight(matrix) -> None:
+    (combination,) = matrix("").combinations()
+    assert matrix("").flight(combination).duration == 1.0
+
+
+def test_every_shipped_experiment_is_right() -> None:
+    for path in (Path(__file__).parent.parent / "experiments").glob("*.toml"):
+        assert len(read_matrix(read_settings(path))) >= 1
