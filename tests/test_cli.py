@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import aircraft
-from harness.commands.telling import BadInput, read_flight_file, writable, writable_folder
+from harness.commands.telling import BadInput, flight_of, read_file, writable, writable_folder
 
 FILE = """\
 [flight]
@@ -135,7 +135,7 @@ def test_a_broken_airframe_is_one_line_that_names_its_file(
     shutil.copytree(aircraft.folder("ultra_stick_25e"), airframe)
     (airframe / "ultra_stick_25e.xml").rename(airframe / "plane.xml")
     flown = ("plant=sixdof", "aircraft=plane")  # beside the settings file
-    _, flight = read_flight_file(file, flown)
+    flight = flight_of(read_file(file, flown))
     assert flight.aircraft == str(airframe)
     text = (airframe / broken).read_text(encoding="utf-8")
     if new is None:
@@ -144,7 +144,7 @@ def test_a_broken_airframe_is_one_line_that_names_its_file(
         assert old in text
         (airframe / broken).write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(BadInput) as caught:
-        read_flight_file(file, flown)
+        flight_of(read_file(file, flown))
     (line,) = caught.value.message.splitlines()
     assert line.startswith(f"--set aircraft=plane: flight.aircraft: {airframe}")
     assert told in line

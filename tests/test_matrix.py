@@ -150,7 +150,7 @@ WRONG_FLIGHTS = [
     ('[matrix]\nplant = ["sixdof"]\n"start.airspeed_mps" = [13, 7]\n', "m.toml:9: flight.start.airspeed_mps: no"),
     ("[matrix]\nseed = [0, -1]\n", "m.toml:8: flight.seed: is -1"),
     (
-        '[matrix]\nseed = [0, 1]\n"wind.steady_mps" = { normal = [[0, 0], [9, 9]] }\n',
+        '[matrix]\nseed = [0, 1]\n"wind.steady_mps" = { normal = [[0, 0], [99, 99]] }\n',
         "m.toml:9: flight.wind.steady_mps",
     ),
 ]
