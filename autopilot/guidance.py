@@ -1,7 +1,7 @@
 """The wires of a guidance law: what it may know, what it answers."""
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 
 class Observation(NamedTuple):
@@ -52,6 +52,10 @@ class Law(Protocol):
     def standoff(self) -> float: ...
     @property
     def max_heading_rate(self) -> float: ...
+    @property
+    def command(self) -> Literal["heading_rate", "course_rate"]:
+        """The quantity that the limit limits."""
+        ...
 
     def start(self) -> Step:
         """A fresh law in flight."""

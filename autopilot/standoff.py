@@ -15,6 +15,7 @@ from autopilot.angles import wrap
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
+_POINTS = 360  # on the circle, the first with the wind
 _CLOSEST = 1e-6  # m: nearer than this the azimuth has no meaning, and its rate is bounded by it
 
 
@@ -69,6 +70,20 @@ def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> flo
     """psi_a from the course: what a small UAV without air data knows. A crosswind beyond v_a counts as v_a."""
     across = (W_x * sin(chi_a) - W_y * cos(chi_a)) / v_a
     return wrap(chi_a + asin(max(-1.0, min(1.0, across))))
+
+
+def holding_course_rate(R_d: float, v_a: float, W_x: float, W_y: float, v_t_x: float, v_t_y: float) -> float:
+    """The largest course rate on the circle around a target of steady velocity, by Eq. (3), (5), (7) at each point."""
+    w_x, w_y = W_x - v_t_x, W_y - v_t_y  # the air against the target
+    along_wind, most = atan2(w_y, w_x), 0.0
+    for i in range(_POINTS):
+        lam = along_wind + 2.0 * pi * i / _POINTS
+        across = w_x * sin(lam) - w_y * cos(lam)
+        if abs(across) < v_a:
+            towards = sqrt(v_a * v_a - across * across)  # v_a cos(bar psi_a^d)
+            rate = (towards + w_x * cos(lam) + w_y * sin(lam)) ** 2 / (towards * R_d)  # |lam_dot + psi_a_d_dot|
+            most = max(most, rate * course_rate_ratio(v_a, lam + asin(across / v_a), W_x, W_y))
+    return most
 
 
 _guidance = Guidance._make  # builds it from a tuple, in half the time

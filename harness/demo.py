@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from harness.commands.telling import number
-from harness.flight import Flight, feasibility_margin, needed_heading_rate
+from harness.flight import Flight, feasibility_margin, needed_rate
 from harness.flight_log import FlightLog
 from harness.metrics import metrics
 from harness.settings import flight_from_document
@@ -117,7 +117,7 @@ def differences(flown: list[Flown]) -> list[str]:
     case, said = flown[0].case, []
     feasible = feasibility_margin(flown[0].log.flight) >= 0
     if not feasible:
-        needed = math.degrees(needed_heading_rate(flown[0].log.flight))
+        needed = math.degrees(needed_rate(flown[0].log.flight))
         said.append(
             f"Infeasible: holding the circle in this wind takes up to {needed:.2f} deg/s, the limit is "
             f"{case.max_heading_rate_deg_s:g}. Every plant leaves it once a lap; what settles has only come back from "

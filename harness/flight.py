@@ -12,6 +12,7 @@ import aircraft
 from autopilot.estimator import Estimator
 from autopilot.guidance import Law
 from autopilot.quantities import About, Metres, Seconds
+from autopilot.standoff import holding_course_rate
 from harness.air import Air
 from harness.plant import Plant, Start
 from harness.plants.kinematic import Kinematic
@@ -190,15 +191,21 @@ def relative_speed(flight: Flight) -> float:
     return max(math.hypot(W_x - s.target_velocity_north, W_y - s.target_velocity_east) for s in _target_states(flight))
 
 
-def needed_heading_rate(flight: Flight) -> float:
-    """The largest heading rate that holding the circle takes, (v_a + w)^2 / (v_a R_d), rad/s."""
+def needed_rate(flight: Flight) -> float:
+    """The largest rate that holding the circle takes of what the law limits, rad/s.
+
+    Heading rate: (v_a + w)^2 / (v_a R_d). Course rate, which a tail wind raises less: (v_a + w) / R_d at rest.
+    """
     v_a = flight.start.airspeed
+    if flight.law.command == "course_rate":
+        velocities = {(s.target_velocity_north, s.target_velocity_east) for s in _target_states(flight)}
+        return max(holding_course_rate(flight.law.standoff, v_a, *flight.wind.steady, *v) for v in velocities)
     return (v_a + relative_speed(flight)) ** 2 / (v_a * flight.law.standoff)
 
 
 def feasibility_margin(flight: Flight) -> float:
-    """The heading-rate limit minus what holding the circle takes, rad/s; negative: the circle cannot be held."""
-    return flight.law.max_heading_rate - needed_heading_rate(flight)
+    """The limit minus what holding the circle takes, rad/s; negative: the circle cannot be held."""
+    return flight.law.max_heading_rate - needed_rate(flight)
 
 
 def warnings(flight: Flight) -> list[str]:
@@ -210,7 +217,7 @@ def warnings(flight: Flight) -> list[str]:
     if ratio >= 1.0:
         said.append(f"Remark 1 asks for v_t + v_w < v_a; here it is {ratio * v_a:.3g} m/s of {v_a:g} m/s")
     if feasibility_margin(flight) < 0:
-        said.append("the circle is infeasible: the heading-rate limit is below what holding it takes")
+        said.append("the circle is infeasible: the limit is below what holding it takes")
     if flight.plant == "sixdof":
         limits = aircraft.limits(aircraft.folder(flight.aircraft))
         if not limits.slowest <= v_a <= limits.fastest:

@@ -4,13 +4,15 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from autopilot.laws import law
 from harness.air import Air
-from harness.flight import Flight, feasibility_margin, needed_heading_rate, problems, warnings
+from harness.flight import Flight, feasibility_margin, needed_rate, problems, warnings
 from harness.plant import Start
 from harness.plants.kinematic import Kinematic
+from harness.simulation import simulate
 from harness.target import Segment, Target
 from harness.wind import Wind
 
@@ -24,8 +26,36 @@ def test_holding_the_circle_takes_the_rate_of_the_formula(
     wind: float, target_speed: float, needed_deg_s: float
 ) -> None:
     flight = replace(FLIGHT, wind=Wind(steady=(wind, 0.0)), target=Target(speed=target_speed))
-    assert math.degrees(needed_heading_rate(flight)) == pytest.approx(needed_deg_s, abs=0.01)
+    assert math.degrees(needed_rate(flight)) == pytest.approx(needed_deg_s, abs=0.01)
     assert math.degrees(feasibility_margin(flight)) == pytest.approx(5.0 - needed_deg_s, abs=0.01)
+
+
+def test_a_limited_course_rate_holds_the_circle_where_a_limited_heading_rate_does_not() -> None:
+    """On the circle around a target at rest the course turns by v_g / R_d, (v_a + w) / R_d at most: 4.58 deg/s."""
+    windy = replace(FLIGHT, wind=Wind(steady=(3.0, 0.0)), duration=300.0)
+    for command, limit, needed, held in (
+        ("heading_rate", 5.0, 16.0**2 / (13.0 * 200.0), False),
+        ("course_rate", 4.7, 16.0 / 200.0, True),
+        ("course_rate", 4.4, 16.0 / 200.0, False),
+    ):
+        steering = law("nftsm", "identified", max_heading_rate=math.radians(limit), command=command)
+        flight = replace(windy, law=steering)
+        assert needed_rate(flight) == pytest.approx(needed, rel=1e-9)
+        assert (feasibility_margin(flight) > 0) is held
+        assert bool(np.abs(simulate(flight)["range_error"][4000:]).max() < 0.1) is held
+
+
+@pytest.mark.parametrize("target", [(0.0, 0.0), (3.0, 2.0), (-4.0, 1.0)])
+def test_the_needed_course_rate_is_the_largest_flown_by_an_unlimited_law(target: tuple[float, float]) -> None:
+    speed, heading = math.hypot(*target), math.atan2(target[1], target[0])
+    steering = law("nftsm", "identified", max_heading_rate=math.inf, command="course_rate")
+    flown = replace(
+        FLIGHT, law=steering, duration=400.0, guidance_period=0.02,
+        wind=Wind(steady=(-2.0, 3.0)), target=Target(speed=speed, heading=heading),
+    )  # fmt: skip
+    log = simulate(flown)
+    course = np.unwrap(np.arctan2(log["velocity_east"], log["velocity_north"]))[10000:]
+    assert needed_rate(flown) == pytest.approx(np.abs(np.diff(course)).max() / 0.02, rel=1e-3)
 
 
 def test_the_needed_rate_is_the_largest_on_a_circle_really_flown_round_a_moving_target() -> None:
@@ -43,7 +73,7 @@ def test_the_needed_rate_is_the_largest_on_a_circle_really_flown_round_a_moving_
     d = [math.remainder(b - a, math.tau) / (angles[1] - angles[0]) for a, b in pairwise(headings)]
     flown = max(abs(slope * rate) for slope, rate in zip(d, rates, strict=False))
     flight = replace(FLIGHT, wind=Wind(steady=wind), target=Target(speed=speed))
-    assert needed_heading_rate(flight) == pytest.approx(flown, rel=1e-3)
+    assert needed_rate(flight) == pytest.approx(flown, rel=1e-3)
 
 
 def test_a_target_that_speeds_up_counts_at_its_fastest() -> None:

@@ -53,12 +53,13 @@ def flight_of(file: SettingsFile) -> Flight:
 
 def feasibility_line(flight: Flight) -> str:
     """Whether the circle can be held, and by what margin."""
-    from harness.flight import feasibility_margin, needed_heading_rate
+    from harness.flight import feasibility_margin, needed_rate
 
-    margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_heading_rate(flight)))
+    margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
+    of = " of course" if flight.law.command == "course_rate" else ""
     verdict = "feasible" if margin >= 0 else "INFEASIBLE"
     return (
-        f"circle {verdict}: holding it takes up to {needed:.2f} deg/s, "
+        f"circle {verdict}: holding it takes up to {needed:.2f} deg/s{of}, "
         f"the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s (margin {margin:+.2f})"
     )
 
