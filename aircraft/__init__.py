@@ -40,6 +40,11 @@ def model(airframe: Path) -> Path:
     return airframe / f"{airframe.name}.xml"
 
 
+def identified(airframe: Path) -> Path:
+    """Where `harness identify` keeps what it found of an airframe."""
+    return airframe / "identified.toml"
+
+
 def data(airframe: Path) -> dict[str, Any]:
     """An airframe's published data; SI, rad; each number with its source. Raises `AirframeError`."""
     return _read(airframe / "airframe.toml")

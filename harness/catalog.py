@@ -1,6 +1,7 @@
 """What there is, in lines for `harness list`."""
 
 from collections.abc import Iterator
+from importlib import import_module
 from typing import get_args, get_type_hints
 
 import aircraft
@@ -27,7 +28,8 @@ def lines(kind: str) -> Iterator[str]:
                 meta, speed = aircraft.data(airframe)["meta"], aircraft.limits(airframe).design_airspeed
                 yield f"{name}: {meta['long_name']}, {meta['layout']}; {speed:g} m/s"
         case "plants":
-            yield from get_args(get_type_hints(Flight)["plant"])
+            for name in get_args(get_type_hints(Flight)["plant"]):
+                yield f"{name}: {(import_module(f'harness.plants.{name}').__doc__ or '').splitlines()[0]}"
         case "metrics":
             for name, meaning in MEANING.items():
                 yield f"{name:30} {meaning}"

@@ -8,6 +8,7 @@ from harness.commands.check import check
 from harness.commands.demo import demo
 from harness.commands.doctor import doctor
 from harness.commands.fly import fly
+from harness.commands.identify import identify
 from harness.commands.list import list_
 from harness.commands.reproduce import reproduce
 from harness.commands.run import run
@@ -25,7 +26,7 @@ def harness() -> None:
     """
 
 
-for command in (fly, run, show, check, list_, demo, reproduce, doctor):
+for command in (fly, run, show, check, list_, demo, reproduce, identify, doctor):
     harness.add_command(command)
 
 

@@ -20,6 +20,7 @@ from harness.target import Target, TargetState
 from harness.track import TrackError, load_track
 from harness.wind import Wind
 
+IDENTIFIED_PLANTS = ("lagged", "coordinated")  # they fly by what `harness identify` left beside the airframe
 MOST_PERIODS = 4_000_000  # of a flight: its log takes 2 GB
 MOST_STEPS = 40_000_000  # of a flight: its gusts take 2 GB
 
@@ -43,7 +44,9 @@ class MetricSettings:
 class Flight:
     """One flight. Defaults are the paper's stationary case (Table 1)."""
 
-    plant: Annotated[Literal["kinematic", "sixdof"], About("everything below the heading-rate command")]
+    plant: Annotated[
+        Literal["kinematic", "lagged", "coordinated", "sixdof"], About("everything below the heading-rate command")
+    ]
     law: Law
     aircraft: Annotated[str, About("an airframe by name, or its folder")] = "ultra_stick_25e"
     duration: Annotated[Seconds, Gt(0), Le(1e6), About("length of the flight")] = 100.0
@@ -76,9 +79,15 @@ def plant_of(flight: Flight) -> Plant:
     """The plant that the flight names."""
     if flight.plant == "kinematic":
         return Kinematic()
-    from harness.plants.sixdof import SixDof  # JSBSim is loaded by those who fly it
+    airframe = aircraft.folder(flight.aircraft)
+    if flight.plant == "sixdof":
+        from harness.plants.sixdof import SixDof  # JSBSim is loaded by those who fly it
 
-    return SixDof(aircraft.folder(flight.aircraft), flight.step, flight.inner_loop.rate_trim)
+        return SixDof(airframe, flight.step, flight.inner_loop.rate_trim)
+    from harness.plants.identified import identified  # and so is scipy
+
+    one = identified(airframe, flight.start.airspeed)
+    return one.lagged if flight.plant == "lagged" else one.coordinated
 
 
 def try_start(flight: Flight) -> None:
@@ -131,18 +140,31 @@ def problems(flight: Flight) -> list[Problem]:
     return found
 
 
-def _aircraft_problems(flight: Flight) -> list[Problem]:
+def airframe_of(name: str) -> Path:
+    """The folder of a sound airframe, by its name or itself. Raises ValueError with what is wrong and allowed."""
     try:
-        airframe = aircraft.folder(flight.aircraft)
+        airframe = aircraft.folder(name)
     except (OSError, ValueError):  # no folder, or no path at all
-        near = get_close_matches(flight.aircraft, aircraft.names(), n=1)
+        near = get_close_matches(name, aircraft.names(), n=1)
         hint = f" - did you mean {near[0]!r}?" if near else ""
         allowed = ", ".join(aircraft.names())
-        return [Problem("aircraft", f"is {flight.aircraft[:60]!r}, must be one of {allowed}, or a folder{hint}")]
+        raise ValueError(f"is {name[:60]!r}, must be one of {allowed}, or a folder{hint}") from None
+    aircraft.limits(airframe)
+    return airframe
+
+
+def _aircraft_problems(flight: Flight) -> list[Problem]:
     try:
-        aircraft.limits(airframe)
-    except aircraft.AirframeError as error:
+        airframe = airframe_of(flight.aircraft)
+    except ValueError as error:
         return [Problem("aircraft", str(error))]
+    if flight.plant in IDENTIFIED_PLANTS:
+        from harness.plants.identified import IdentifiedError, identified
+
+        try:
+            identified(airframe, flight.start.airspeed)
+        except IdentifiedError as error:
+            return [Problem("start.airspeed", str(error))]
     return []
 
 
@@ -218,8 +240,16 @@ def warnings(flight: Flight) -> list[str]:
         said.append(f"Remark 1 asks for v_t + v_w < v_a; here it is {ratio * v_a:.3g} m/s of {v_a:g} m/s")
     if feasibility_margin(flight) < 0:
         said.append("the circle is infeasible: the limit is below what holding it takes")
-    if flight.plant == "sixdof":
-        limits = aircraft.limits(aircraft.folder(flight.aircraft))
+    airframe = aircraft.folder(flight.aircraft)
+    if flight.plant in IDENTIFIED_PLANTS:
+        from harness.plants.identified import is_stale
+
+        if is_stale(airframe):
+            said.append(f"{airframe.name} has changed since it was identified: run harness identify {flight.aircraft}")
+        if not flight.inner_loop.rate_trim:
+            said.append(f"rate_trim = false changes sixdof only: {flight.plant} has no shortfall to leave")
+    if flight.plant in ("coordinated", "sixdof"):
+        limits = aircraft.limits(airframe)
         if not limits.slowest <= v_a <= limits.fastest:
             envelope = f"{limits.slowest:g} to {limits.fastest:g} m/s"
             said.append(f"{v_a:g} m/s is outside the airframe's envelope, {envelope}")

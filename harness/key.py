@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import aircraft
 import autopilot
-from harness.flight import Flight
+from harness.flight import IDENTIFIED_PLANTS, Flight
 from harness.settings import document
 
 PHYSICS = 1  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
@@ -56,6 +56,8 @@ def files(flight: Flight) -> dict[str, Path]:
     found = {f"autopilot/{name}": on_board / name for name in _sources(on_board)}
     if flight.target.track is not None:
         found["target/track"] = Path(flight.target.track)
+    if flight.plant in IDENTIFIED_PLANTS:
+        found["aircraft/identified.toml"] = aircraft.identified(aircraft.folder(flight.aircraft))
     if flight.plant == "sixdof":
         found["autopilot/inner_loop.xml"] = on_board / "inner_loop.xml"
         found["harness/plants/planet.xml"] = Path(__file__).parent / "plants" / "planet.xml"

@@ -1,0 +1,126 @@
+"""Least squares: the response that follows what was flown."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.optimize import least_squares
+from scipy.signal import fftconvolve, lfilter
+
+from harness.identification.manoeuvres import STEP
+from harness.plants.coordinated import AirspeedHold
+from harness.plants.response import Response
+
+Array = NDArray[np.float64]
+
+_COMPARED = 4  # steps: what is fitted are means over 20 ms
+
+
+class Fitted(NamedTuple):
+    """What a response is to follow, a value per step: its input, and the output's mean over each step."""
+
+    input: Array
+    output: Array
+
+
+_START = Response(
+    delay=0.02, frequency=10.0, damping=0.8, sideslip_frequency=4.0, sideslip_damping=0.6,
+    zero_frequency=4.2, zero_damping=0.7, tail_rate=0.5, tail_share=0.05,
+)  # fmt: skip
+_LOWEST = (0.0, 1.0, 0.2, 0.5, 0.2, 0.5, -2.0, 0.1, -0.5)
+_HIGHEST = (0.3, 60.0, 3.0, 60.0, 3.0, 100.0, 5.0, 3.0, 0.9)
+_FIELDS = tuple(Response.__dataclass_fields__)
+
+
+def fit(records: Sequence[Fitted]) -> Response:
+    """The response that follows the records best, each weighing the same relative to its input."""
+    weights = [1.0 / math.sqrt(np.sum(record.input**2) / _COMPARED) for record in records]
+    longest = max(len(record.input) for record in records)
+
+    def errors(x: Array) -> Array:
+        kernel = pulse_response(response_of(x), longest)
+        return np.concatenate(
+            [
+                weight * means(_convolved(record.input, kernel) - record.output)
+                for record, weight in zip(records, weights, strict=True)
+            ]
+        )
+
+    start = np.array([getattr(_START, name) for name in _FIELDS])
+    found = least_squares(errors, start, bounds=(_LOWEST, _HIGHEST), x_scale=start, xtol=1e-7, ftol=1e-7)
+    return response_of(found.x)
+
+
+def response_of(x: Array) -> Response:
+    """The response with these numbers, in the order of its fields."""
+    return Response(**dict(zip(_FIELDS, (float(value) for value in x), strict=True)))
+
+
+def error(response: Response, record: Fitted) -> float:
+    """RMS of (model - flown), means over 20 ms, relative to the RMS of the input."""
+    wrong = means(followed(response, record.input) - record.output)
+    return float(np.sqrt(np.mean(wrong**2) / np.mean(record.input**2)))
+
+
+def followed(response: Response, command: Array) -> Array:
+    """What the response makes of a command, a value per step: its mean over each step."""
+    return _convolved(command, pulse_response(response, len(command)))
+
+
+def pulse_response(response: Response, count: int) -> Array:
+    """The mean output over each of `count` steps after a command of one, held for a single step."""
+    A, b, c = response.matrices()
+    n = len(b)
+    system = np.zeros((n + 2, n + 2))
+    system[:n, :n], system[:n, -1], system[n, :n] = A, b, c
+    whole = int(response.delay // STEP)
+    late = response.delay - whole * STEP  # into a step: the pulse then ends as late in the next
+    before, after = expm(system * late), expm(system * (STEP - late))
+    step = (after @ before)[: n + 1, : n + 1]
+    begun, ended = after[: n + 1, -1], after[: n + 1, : n + 1] @ before[: n + 1, -1]
+    second = step[:, :n] @ begun[:n] + ended
+    states, power = second[:n, np.newaxis], step[:n, :n]
+    while states.shape[1] < count:  # doubling
+        states, power = np.hstack([states, power @ states]), power @ power
+    means = np.concatenate([np.zeros(whole), [begun[n], second[n]], step[n, :n] @ states]) / STEP
+    return means[:count]
+
+
+def fit_airspeed(records: Sequence[Fitted]) -> AirspeedHold:
+    """The hold that follows the records (load factor beyond one; change of airspeed), each weighing the same."""
+    weights = [1.0 / max(float(np.sqrt(np.sum(record.input**2))), 1e-12) for record in records]
+
+    def errors(x: Array) -> Array:
+        hold = AirspeedHold(gain=float(x[0]), frequency=float(x[1]), damping=float(x[2]))
+        return np.concatenate(
+            [
+                weight * (airspeed_change(hold, record.input) - record.output)[::_COMPARED]
+                for record, weight in zip(records, weights, strict=True)
+            ]
+        )
+
+    found = least_squares(errors, [-0.5, 0.8, 1.0], bounds=([-20, 0.05, 0.05], [20, 10, 10]), xtol=1e-7)
+    return AirspeedHold(gain=float(found.x[0]), frequency=float(found.x[1]), damping=float(found.x[2]))
+
+
+def airspeed_change(hold: AirspeedHold, excess: Array) -> Array:
+    """What the load factor beyond one, held over each step, does to the airspeed at the steps' ends. m/s."""
+    F = np.array([[-2 * hold.damping * hold.frequency, -(hold.frequency**2), hold.gain], [1, 0, 0], [0, 0, 0]])
+    step = expm(F * STEP)
+    (a, b), (c, d) = step[:2, :2]
+    g, k = step[:2, 2]
+    # v over e, of z v = a v + b i + g e, z i = c v + d i + k e
+    return np.asarray(lfilter([0.0, g, b * k - d * g], [1.0, -(a + d), a * d - b * c], np.append(excess, 0.0))[1:])
+
+
+def _convolved(command: Array, kernel: Array) -> Array:
+    return np.asarray(fftconvolve(command, kernel[: len(command)])[: len(command)])
+
+
+def means(values: Array) -> Array:
+    """Of four steps each, 20 ms."""
+    whole = len(values) // _COMPARED * _COMPARED
+    return np.asarray(values[:whole].reshape(-1, _COMPARED).mean(axis=1))

@@ -1,0 +1,193 @@
+"""The identification of an airframe: manoeuvres flown on 6-DOF, responses fitted, and both compared."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import aircraft
+from harness.air import Air
+from harness.identification import manoeuvres
+from harness.identification.fit import Array, Fitted, airspeed_change, fit, fit_airspeed, means
+from harness.identification.manoeuvres import (
+    CHATTER,
+    HELD_OUT,
+    STEP,
+    STEPS_DEG_S,
+    SWEEP_PERIOD,
+    SWEPT,
+    TRAINING,
+    Record,
+    flown,
+    held,
+    sweep,
+)
+from harness.plant import Plant, Start
+from harness.plants.coordinated import GRAVITY, bank_of
+from harness.plants.identified import Identified
+from harness.state import State
+
+_BANK = State._fields.index("bank")
+_SHOWN = 10.0  # s, of the steps
+_AIRSPEED_STEPS_DEG_S = (5.0, 10.0, 20.0)
+
+
+@dataclass(frozen=True, slots=True)
+class StepResponse:
+    """A flown step of heading-rate command, relative to it."""
+
+    amplitude: float  # rad/s
+    rate: Array  # a value per simulation step
+    lag: float  # s to 63 %
+    overshoot: float
+    gain: float  # mean of the last 2 s
+    turn_ratio: float  # heading rate over g tan(bank) / V, over the same 2 s
+    bank: float  # rad, the largest
+
+
+@dataclass(frozen=True, slots=True)
+class FrequencyResponse:
+    """A flown sweep: flown over commanded at each of `manoeuvres.lines()`."""
+
+    rms: float  # rad/s, of the command
+    ratio: NDArray[np.complex128]
+
+    @property
+    def bandwidth(self) -> float:
+        """Where the gain first falls through -3 dB, rad/s; NaN when it does not."""
+        gain, omega = np.abs(self.ratio), np.log(manoeuvres.lines())
+        below = np.flatnonzero((gain[1:] < math.sqrt(0.5)) & (gain[:-1] >= math.sqrt(0.5)))
+        if not below.size:
+            return math.nan
+        i = below[0]
+        return math.exp(float(np.interp(-math.sqrt(0.5), -gain[i : i + 2], omega[i : i + 2])))
+
+    def at(self, omega: float) -> tuple[float, float]:
+        """Gain, and phase in rad, interpolated between the lines."""
+        lines = np.log(manoeuvres.lines())
+        phase = np.unwrap(np.angle(self.ratio))
+        return float(np.interp(math.log(omega), lines, np.abs(self.ratio))), float(
+            np.interp(math.log(omega), lines, phase)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """Everything that `harness identify` tells and draws."""
+
+    airframe: Path
+    identified: Identified
+    steps: tuple[StepResponse, ...]
+    sweeps: Mapping[str, FrequencyResponse]
+    airspeed_error: tuple[float, float]  # m/s RMS: of the hold's model in the largest step, and of no model at all
+
+
+FLIGHTS = 2 * len(TRAINING) + len(HELD_OUT) + len(CHATTER) + len(STEPS_DEG_S) + len(SWEPT) + len(_AIRSPEED_STEPS_DEG_S)
+
+
+def identify(airframe: Path, airspeed: float, done: Callable[[], None] = lambda: None) -> Identification:
+    """Flies, fits and compares; `done` is called after each of `FLIGHTS`. Raises `PlantError` or `End` of a flight."""
+
+    def fly(command: Array, rate_trim: bool = True) -> Record:
+        record = flown(airframe, airspeed, command, rate_trim)
+        done()
+        return record
+
+    limit = aircraft.limits(airframe).bank
+    steps = tuple(step_response(fly(held([rate], _SHOWN))) for rate in STEPS_DEG_S)
+    sweeps = {name: frequency_response(fly(sweep(rms, periods=2))) for name, rms in SWEPT.items()}
+    heading_rate = fit([of_heading_rate(fly(command)) for command in TRAINING.values()])
+    bank = fit([of_bank(fly(command, rate_trim=False), limit) for command in TRAINING.values()])
+    entries = [of_airspeed(fly(held([rate, 0.0], _SHOWN))) for rate in _AIRSPEED_STEPS_DEG_S]
+    found = Identified(
+        airspeed=airspeed, heading_rate=heading_rate, bank=bank, hold=fit_airspeed(entries), bank_limit=limit,
+        measured={}, errors={},
+    )  # fmt: skip
+    errors = {name: _errors(found, fly(command)) for name, command in {**HELD_OUT, **CHATTER}.items()}
+    five = steps[STEPS_DEG_S.index(5.0)]
+    measured = {
+        "gain": five.gain, "lag_s": five.lag, "overshoot": five.overshoot, "turn_ratio": five.turn_ratio,
+        "bandwidth_rad_s": sweeps["medium"].bandwidth,
+    }  # fmt: skip
+    change = airspeed_change(found.hold, entries[-1].input)
+    return Identification(
+        airframe=airframe,
+        identified=replace(found, measured=measured, errors=errors),
+        steps=steps,
+        sweeps=sweeps,
+        airspeed_error=(_rms(change - entries[-1].output), _rms(entries[-1].output)),
+    )
+
+
+def of_heading_rate(record: Record) -> Fitted:
+    """Heading rate from its command."""
+    return Fitted(record.command, record.heading_rate)
+
+
+def of_bank(record: Record, limit: float) -> Fitted:
+    """Bank from its command, as the inner loop makes it of the heading rate's."""
+    commanded = np.array([bank_of(rate, record.airspeed, limit) for rate in record.command.tolist()])
+    bank = record.states[:, _BANK]
+    return Fitted(commanded, 0.5 * (bank[1:] + bank[:-1]))
+
+
+def of_airspeed(record: Record) -> Fitted:
+    """Change of airspeed from the load factor beyond one."""
+    return Fitted(1.0 / np.cos(record.states[:-1, _BANK]) - 1.0, record["airspeed"] - record.airspeed)
+
+
+def step_response(record: Record) -> StepResponse:
+    """A step's figures."""
+    amplitude = float(record.command[0])
+    share = record.heading_rate / amplitude
+    reached = 1.0 - math.exp(-1.0)
+    after = int(np.argmax(share >= reached))
+    before = max(after - 1, 0)
+    lag = STEP * (0.5 + float(np.interp(reached, share[[before, after]], [before, after])))  # a mean is of mid-step
+    last = slice(-round(2.0 / STEP), None)
+    coordinated = GRAVITY * np.tan(record["bank"]) / record["airspeed"]
+    gain = float(share[last].mean())
+    return StepResponse(
+        amplitude=amplitude,
+        rate=share,
+        lag=lag,
+        overshoot=max(0.0, float(share.max()) - 1.0),
+        gain=gain,
+        turn_ratio=gain * amplitude / float(coordinated[last].mean()),
+        bank=float(np.abs(record["bank"]).max()),
+    )
+
+
+def frequency_response(record: Record) -> FrequencyResponse:
+    """The second period of a sweep, where the first has died away."""
+    count = round(SWEEP_PERIOD / STEP)
+    multiples = np.round(manoeuvres.lines() / manoeuvres.SLOWEST).astype(int)
+    command, rate = (np.fft.rfft(values[-count:])[multiples] for values in (record.command, record.heading_rate))
+    return FrequencyResponse(_rms(record.command), rate / command)
+
+
+def _errors(found: Identified, record: Record) -> tuple[float, float]:
+    """Of the plants lagged and coordinated: heading rate less the flown, RMS of means over 20 ms over the command's."""
+    lagged, coordinated = (_followed(plant, record) for plant in (found.lagged, found.coordinated))
+    scale = _rms(record.command)
+    return (
+        _rms(means(lagged - record.heading_rate)) / scale,
+        _rms(means(coordinated - record.heading_rate)) / scale,
+    )
+
+
+def _followed(plant: Plant, record: Record) -> Array:
+    """What the plant makes of the record's command: the mean heading rate over each step."""
+    flying = plant.start(Start(airspeed=record.airspeed, heading=0.0), Air())
+    headings = [0.0]
+    for rate in record.command.tolist():
+        flying.advance(rate, STEP)
+        headings.append(flying.state.heading)
+    return np.diff(np.unwrap(headings)) / STEP
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values * values)))

@@ -1,0 +1,98 @@
+"""The commands that an airframe is identified with, and what it did."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.air import Air
+from harness.plant import Start
+from harness.plants.sixdof import SixDof
+from harness.randomness import stream
+from harness.state import State
+
+Array = NDArray[np.float64]
+
+STEP = 0.005  # s, of the simulation and of every command here
+SLOWEST, FASTEST = 0.05, 20.0  # rad/s, of the sweep
+SWEEP_PERIOD = 2.0 * math.pi / SLOWEST  # s
+SWEPT = MappingProxyType({"small": 0.5, "medium": 2.0, "large": 4.0})  # deg/s rms
+STEPS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0)
+
+
+def held(levels_deg_s: Sequence[float], each: float) -> Array:
+    """Each level held for `each` seconds; rad/s, a value per step."""
+    return np.repeat(np.radians(levels_deg_s), round(each / STEP))
+
+
+def lines() -> Array:
+    """The frequencies of the sweep: whole multiples of the slowest, evenly spread over the decades. rad/s."""
+    return SLOWEST * np.unique(np.round(np.geomspace(1.0, FASTEST / SLOWEST, 50)))
+
+
+def sweep(rms_deg_s: float, periods: int = 1) -> Array:
+    """All frequencies of `lines()` at once, equally strong, with phases by chance. rad/s, a value per step."""
+    time = STEP * np.arange(round(SWEEP_PERIOD / STEP))
+    omega = lines() * SWEEP_PERIOD / (STEP * len(time))  # the period is a whole number of steps
+    phases = stream(0, "sweep").uniform(0.0, 2.0 * math.pi, len(omega))
+    x = np.sin(np.outer(time, omega) + phases).sum(axis=1)
+    return np.tile(math.radians(rms_deg_s) * x / np.sqrt(np.mean(x * x)), periods)
+
+
+TRAINING: Mapping[str, Array] = MappingProxyType(
+    {
+        "step of 5 deg/s": held([5], 10.0),
+        "step of -2 deg/s": held([-2], 10.0),
+        "reversals between 10 and -10 deg/s": held([10, -10, 0], 4.0),
+        "reversals between 5 and -5 deg/s every 0.3 s": held([5, -5] * 15, 0.3),
+        "sweep of 2 deg/s rms": sweep(SWEPT["medium"]),
+        "sweep of 4 deg/s rms": sweep(SWEPT["large"]),
+    }
+)
+HELD_OUT: Mapping[str, Array] = MappingProxyType(
+    {
+        "step of 3 deg/s": held([3], 10.0),
+        "step of -8 deg/s": held([-8], 10.0),
+        "step of 15 deg/s": held([15], 10.0),
+        "turns, changed every 3 s": held([4, -4, 6, 0, -5, 2], 3.0),
+        "turns, changed every second": held([3, 5, -1, 4, -3, -5, 0, 2], 1.0),
+    }
+)
+CHATTER: Mapping[str, Array] = MappingProxyType(
+    {
+        f"reversals between {high:g} and {low:g} deg/s every {each:g} s": held([high, low] * round(12.0 / each), each)
+        for high, low, each in ((5.0, -5.0, 0.4), (5.0, -5.0, 0.2), (1.0, -1.0, 0.2), (5.0, -2.0, 0.3))
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A command and what the airframe did with it. `states` has a row per step, the first one before it."""
+
+    command: Array  # rad/s, a value per step
+    states: Array
+    airspeed: float  # nominal
+
+    def __getitem__(self, field: str) -> Array:
+        """A field of the state at the end of each step."""
+        return self.states[1:, State._fields.index(field)]
+
+    @property
+    def heading_rate(self) -> Array:
+        """The mean over each step."""
+        return np.diff(np.unwrap(self.states[:, State._fields.index("heading")])) / STEP
+
+
+def flown(airframe: Path, airspeed: float, command: Array, rate_trim: bool = True) -> Record:
+    """The command flown from trim on the 6-DOF airframe. Raises `PlantError` or `End` when it cannot."""
+    flying = SixDof(airframe, STEP, rate_trim).start(Start(airspeed=airspeed, heading=0.0), Air())
+    states = [flying.state]
+    for rate in command.tolist():
+        flying.advance(rate, STEP)
+        states.append(flying.state)
+    return Record(command, np.array(states), airspeed)

@@ -1,0 +1,40 @@
+"""The first rung above Eq. (1): the heading rate follows its command as behind the airframe's inner loop, gain one."""
+
+import math
+from dataclasses import dataclass
+
+from autopilot.angles import wrap
+from harness.air import Air
+from harness.plant import Flying, Start
+from harness.plants.level import Level
+from harness.plants.response import Motion, Response, dot, gauss
+
+_NODES = 4  # of the quadrature of the position in a piece of at most 50 ms
+_WEIGHTS = tuple(float(weight) for weight in gauss(_NODES)[1])
+
+
+@dataclass(frozen=True, slots=True)
+class Lagged:
+    """Level at constant airspeed. The heading is exact, the position its quadrature (to 1e-9 m in 100 s)."""
+
+    response: Response
+
+    def start(self, start: Start, air: Air) -> Flying:
+        return _LaggedFlying(self.response, start, air)
+
+
+class _LaggedFlying:
+    def __init__(self, response: Response, start: Start, air: Air) -> None:
+        self._motion, self._level, self._airspeed = Motion(response, _NODES), Level(start, air), start.airspeed
+        self.state = self._level.state(*start.position, start.airspeed, wrap(start.heading), 0.0)
+
+    def advance(self, heading_rate: float, period: float) -> None:
+        motion, v_a = self._motion, self._airspeed
+        x, y, psi = self.state.north, self.state.east, self.state.heading
+        for now, piece in motion.pieces(heading_rate, period):
+            *turned, turn = [dot(row, now) for row in piece.integrals]
+            x += v_a * piece.length * dot(_WEIGHTS, [math.cos(psi + angle) for angle in turned])
+            y += v_a * piece.length * dot(_WEIGHTS, [math.sin(psi + angle) for angle in turned])
+            psi += turn
+        north, east = self._level.carried(period)
+        self.state = self._level.state(x + north, y + east, v_a, wrap(psi), motion.output)

@@ -1,0 +1,49 @@
+"""Level flight in moving air: what the plants without an airframe share."""
+
+import math
+
+from harness.air import Air
+from harness.plant import Start
+from harness.state import State
+
+_UNKNOWN = (math.nan,) * (State._fields.index("throttle") - State._fields.index("bank_command"))
+
+
+class Level:
+    """The air that carries a level flight, at once: Eq. (1).
+
+    What is shown of its gusts is their velocity now; the way between is the mean's.
+    """
+
+    def __init__(self, start: Start, air: Air) -> None:
+        self._altitude, self._air, self._step = start.altitude, air, 0
+
+    def carried(self, period: float) -> tuple[float, float]:
+        """How far the air moves in the next `period` seconds; m north, east."""
+        air, begin = self._air, self._step
+        self._step += round(period / air.step)
+        W_x, W_y = air.steady
+        gusts_x, gusts_y = air.drift(begin, self._step)
+        return W_x * period + gusts_x, W_y * period + gusts_y
+
+    def state(
+        self,
+        x: float,
+        y: float,
+        v_a: float,
+        psi: float,
+        heading_rate: float,
+        bank: float = math.nan,
+        roll_rate: float = math.nan,
+        bank_command: float = math.nan,
+    ) -> State:
+        """The state now: position, air velocity, and what the plant has beside."""
+        W_x, W_y = self._air.steady
+        gust_x, gust_y, gust_z = self._air.gust(self._step)
+        W_x, W_y = W_x + gust_x, W_y + gust_y
+        return State._make(
+            (
+                x, y, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, v_a, psi, heading_rate, bank, roll_rate,
+                self._altitude, 0.0, math.nan, math.nan, math.nan, math.nan, bank_command, *_UNKNOWN, W_x, W_y, gust_z,
+            )
+        )  # fmt: skip
