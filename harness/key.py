@@ -56,15 +56,16 @@ def files(flight: Flight) -> dict[str, Path]:
     found = {f"autopilot/{name}": on_board / name for name in _sources(on_board)}
     if flight.target.track is not None:
         found["target/track"] = Path(flight.target.track)
-    if flight.plant in IDENTIFIED_PLANTS:
-        found["aircraft/identified.toml"] = aircraft.identified(aircraft.folder(flight.aircraft))
     if flight.plant == "sixdof":
         found["autopilot/inner_loop.xml"] = on_board / "inner_loop.xml"
         found["harness/plants/planet.xml"] = Path(__file__).parent / "plants" / "planet.xml"
+    if flight.plant != "kinematic":
         airframe = aircraft.folder(flight.aircraft)
         found["aircraft/model"] = aircraft.model(airframe)
-        for name in ("airframe.toml", "inner_loop.toml"):
-            found[f"aircraft/{name}"] = airframe / name
+        names = ["airframe.toml", "inner_loop.toml"]
+        if flight.plant in IDENTIFIED_PLANTS:
+            names.append(aircraft.identified(airframe).name)
+        found |= {f"aircraft/{name}": airframe / name for name in names}
     return found
 
 

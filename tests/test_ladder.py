@@ -83,10 +83,10 @@ def test_nothing_happens_before_the_delay() -> None:
 
 @pytest.mark.parametrize("plant", [Lagged(WHOLE), Coordinated(WHOLE, replace(NO_CHANGE, gain=-0.5), 0.8)])
 def test_a_command_in_pieces_flies_as_the_command_whole(plant: Plant) -> None:
-    """To 1e-7 m after 1300 m: the bound of the quadrature of the position, ten and twenty times finer in the pieces."""
-    coarse, fine, finest = (zigzag(plant, period) for period in (0.05, 0.005, 0.0025))
-    assert apart(coarse, finest) < 1e-7
-    assert apart(fine, finest) < 1e-8
+    """To 1e-8 m after 400 m: the bound of the quadrature of the position, five and twenty times finer in the pieces."""
+    coarse, fine, finest = (zigzag(plant, period, 30.0) for period in (0.05, 0.01, 0.0025))
+    assert apart(coarse, finest) < 1e-8
+    assert apart(fine, finest) < 1e-9
     assert coarse.state.heading == pytest.approx(finest.state.heading, abs=1e-10)
 
 

@@ -15,7 +15,7 @@ _WEIGHTS = tuple(float(weight) for weight in gauss(_NODES)[1])
 
 @dataclass(frozen=True, slots=True)
 class Lagged:
-    """Level at constant airspeed. The heading is exact, the position its quadrature (to 1e-9 m in 100 s)."""
+    """Level at constant airspeed. The heading is exact, the position its quadrature (1e-8 m off after 400 m)."""
 
     response: Response
 
