@@ -5,13 +5,15 @@ import math
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import aircraft
+from autopilot.guidance import Guidance, Observation, Step
 from autopilot.laws import law
 from harness.air import Air
 from harness.flight import Flight
@@ -119,6 +121,47 @@ def test_a_roll_beyond_80_degrees_ends_as_departed() -> None:
         for _ in range(400):
             flying.advance(0.05, 0.05)
     assert end.value.outcome is Outcome.DEPARTED
+
+
+def test_a_stall_that_lasts_ends_as_departed() -> None:
+    flying = SixDof(STICK, STEP, True).start(Start(), Air())
+    flying._run.__self__["inner-loop/command/airspeed-mps"] = 5.0
+    with pytest.raises(End, match="stalled for 3 s") as end:
+        for _ in range(400):
+            flying.advance(0.0, 0.05)
+    assert end.value.outcome is Outcome.DEPARTED
+
+
+@dataclass(frozen=True)
+class Faulty:
+    """A law that is right 20 times."""
+
+    answer: float | None  # None: it raises
+    standoff: float = 200.0
+    max_heading_rate: float = 0.1
+    command: str = "heading_rate"
+
+    def start(self) -> Step:
+        calls = count()
+
+        def step(o: Observation) -> Guidance:
+            right = next(calls) < 20
+            if not right and self.answer is None:
+                raise ZeroDivisionError("of its own")
+            return Guidance(0.0 if right else self.answer, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+        return step
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [(None, "the law raised ZeroDivisionError: of its own"), (math.nan, "the law commanded nan")],
+)
+def test_a_law_at_fault_ends_as_invalid_with_what_was_flown_until_then(answer: float | None, reason: str) -> None:
+    log = simulate(flight(plant="kinematic", law=Faulty(answer)))
+    assert (log.outcome, log.reason) == (Outcome.INVALID, reason)
+    assert log.outcome.failed
+    assert len(log) == 20
 
 
 def test_a_log_ends_where_the_flight_ended() -> None:
