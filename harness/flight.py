@@ -114,10 +114,9 @@ def problems(flight: Flight) -> list[Problem]:
         ("guidance periods", flight.guidance_period, MOST_PERIODS),
         ("steps", flight.step, MOST_STEPS),
     ):
-        if flight.duration / period > most:
+        if not found and flight.duration / period > most:
             many = f"takes {flight.duration / period:.3g} {what} of {period:g} s, must be {most:g} at most"
             found.append(Problem("duration", many))
-            break
     sample, guidance = flight.estimator.period, flight.guidance_period
     if flight.estimator.kind == "ekf":
         if not _is_multiple(sample, flight.step):

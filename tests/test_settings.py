@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.laws import LAWS, law
-from harness.flight import Flight
+from harness.flight import Flight, feasibility_margin, warnings
 from harness.plant import Start
 from harness.settings import (
     SettingsError,
@@ -247,3 +247,39 @@ def test_a_document_without_a_file_is_told_by_its_keys() -> None:
 def test_reading_settings_loads_no_simulator() -> None:
     code = "import harness.settings, sys; assert not {'jsbsim', 'pandas', 'rerun', 'scipy'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=STATIONARY.parent.parent)
+
+
+ODD = (
+    "-1",
+    "0",
+    "1e9",
+    "1e300",
+    "nan",
+    "inf",
+    "true",
+    "'x'",
+    "''",
+    "[1, 2]",
+    "[{}]",
+    "1979-05-27",
+    "'''a\nb'''",
+    '"\\u0000"',
+)
+
+
+def test_whatever_a_key_is_set_to_there_is_a_flight_that_can_be_told_or_lines_that_begin_with_the_setting() -> None:
+    settings = document(load_flight(STATIONARY))
+    names = [*settings, *(f"{name}.{key}" for name, part in settings.items() if isinstance(part, dict) for key in part)]
+    flights, told = [], {}
+    for typed in (f"{name}={value}" for name in names for value in ODD):
+        try:
+            flights.append(load_flight(STATIONARY, [typed]))
+        except SettingsError as error:
+            told[typed] = error.lines
+    for typed, lines in told.items():
+        begins = f"--set {' '.join(typed.split())}: flight."
+        assert [line for line in lines if not line.startswith((begins, str(STATIONARY)))] == []
+    for flight in flights:
+        json.dumps([document(flight), warnings(flight), feasibility_margin(flight)])
+    assert len(flights) > 20
+    assert len(told) > 500

@@ -60,7 +60,7 @@ class SettingsFile:
     def _place(self, key: Key) -> Place:
         for length in range(len(key), 0, -1):
             if key[:length] in self.overrides:
-                return Place(sys.maxsize, f"--set {self.overrides[key[:length]]}")
+                return Place(sys.maxsize, f"--set {' '.join(self.overrides[key[:length]].split())}")
         line = nearest_line(self.lines, key)
         return Place(line, f"{self.path}:{line}")
 
