@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import aircraft
@@ -46,6 +46,7 @@ def apart(a: Flying, b: Flying) -> float:
     return math.dist(a.state[:2], b.state[:2])
 
 
+@settings(deadline=None, max_examples=40)
 @given(
     delay=st.floats(0.0, 0.2), frequency=st.floats(2.0, 20.0), damping=st.floats(0.2, 0.95), periods=st.integers(1, 60)
 )
