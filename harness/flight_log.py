@@ -45,5 +45,5 @@ class FlightLog:
     def digest(self) -> str:
         """A hash of the trajectory to the last bit, and of how it ended."""
         content = hashlib.blake2b(repr((COLUMNS, self.outcome.value, self.reason)).encode(), digest_size=16)
-        content.update(np.ascontiguousarray(self.table + 0.0).tobytes())  # + 0.0: minus zero is zero
+        content.update(np.ascontiguousarray(self.table + 0.0).data)  # + 0.0: minus zero is zero
         return content.hexdigest()

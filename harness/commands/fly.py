@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from harness.flight_log import FlightLog
     from harness.runs.recall import Place, Recalled
-    from harness.runs.row import Row
+    from harness.runs.row import Judged
 
 
 @click.command()
@@ -34,9 +33,10 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
 
     from harness.commands.telling import BadInput, feasibility_line, flight_of, number, read_file, writable
     from harness.flight import warnings
+    from harness.key import identity
     from harness.metrics import MEANING
     from harness.runs.recall import place_of
-    from harness.runs.row import row_of
+    from harness.runs.row import judged, row
     from harness.simulation import simulate
 
     place = place_of(what)
@@ -49,10 +49,11 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     for warning in warnings(flight):
         click.echo(f"warning: {warning}", err=True)
     log = simulate(flight)
-    result = row_of(log)
+    how = judged(log)
+    result = row(flight, identity(flight), how)
     if recalled and not overrides:
         result.update(key=recalled.stored.row["key"], flight=recalled.stored.row["flight"])
-        _compare(recalled, log, result)
+        _compare(recalled, how)
     if rrd is not None:
         from harness.review.recording import write_recording
 
@@ -81,13 +82,13 @@ def _recalled(place: Place) -> Recalled:
         raise BadInput(str(error)) from None
 
 
-def _compare(recalled: Recalled, log: FlightLog, row: Row) -> None:
+def _compare(recalled: Recalled, how: Judged) -> None:
     """Says whether the flight is the stored one, to the last bit."""
     from harness.runs.recall import deviation
 
     if not recalled.digest:
         click.echo(f"the row has no digest to compare with: it ended in {recalled.stored.row['outcome']}", err=True)
-    elif apart := deviation(recalled.stored.row, row, log):
+    elif apart := deviation(recalled.stored, how):
         why = (
             f"changed since: {', '.join(recalled.changed)}" if recalled.changed else "though nothing known has changed"
         )

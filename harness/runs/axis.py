@@ -16,18 +16,36 @@ _MOST = 10_000_000  # values of an axis
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """The values of one key, or of several that vary together: a tuple has one for each."""
+    """The values of one key, or of several that vary together."""
 
     keys: tuple[str, ...]
-    values: Sequence[tuple[object, ...]]
-    lines: Sequence[int]  # where each stands
+    values: Sequence[Any]  # of several keys, each a list with one for each key
+    lines: Sequence[int]  # where each stands; one for all that stand together
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def at(self, i: int) -> Iterator[tuple[str, object]]:
+        """Each key with its i-th value."""
+        value = self.values[i]
+        return zip(self.keys, value if len(self.keys) > 1 else (value,), strict=True)
+
+    def line(self, i: int) -> int:
+        """Where the i-th value stands."""
+        return self.lines[min(i, len(self.lines) - 1)]
+
+    def choices(self) -> dict[str, Sequence[Any]]:
+        """All values of each key."""
+        if len(self.keys) == 1:
+            return {self.keys[0]: self.values}
+        return {key: [value[i] for value in self.values] for i, key in enumerate(self.keys)}
 
     def only(self, keys: Sequence[str]) -> "Axis":
         """The axis with these of its keys."""
         if len(keys) == len(self.keys):
             return self
-        kept = [self.keys.index(key) for key in keys]
-        return Axis(tuple(keys), [tuple(v[i] for i in kept) for v in self.values], self.lines)
+        kept = [self.choices()[key] for key in keys]
+        return Axis(tuple(keys), kept[0] if len(kept) == 1 else list(zip(*kept, strict=True)), self.lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +111,11 @@ def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -
     if not value:
         raise ValueError("the list is empty: no flight is left")
     if len(keys) == 1:
-        return Axis(keys, [(v,) for v in value], [line(i) for i in range(len(value))])
-    together: list[tuple[object, ...]] = []
+        return Axis(keys, value, [line(i) for i in range(len(value))])
     for i, element in enumerate(value):
-        if isinstance(element, list) and len(element) == len(keys):
-            together.append(tuple(element))
-        else:
+        if not (isinstance(element, list) and len(element) == len(keys)):
             raise ValueError(f"element {i + 1} is {element!r}, must be a list of {len(keys)}: {name}")
-    return Axis(keys, together, [line(i) for i in range(len(value))])
+    return Axis(keys, value, [line(i) for i in range(len(value))])
 
 
 def _form(key: str, table: Mapping[str, Any], line: int) -> Axis | Draw:
@@ -111,9 +126,9 @@ def _form(key: str, table: Mapping[str, Any], line: int) -> Axis | Draw:
         start, count = (_whole(table, name) for name in ("start", "count"))
         if not 1 <= count <= _MOST:
             raise ValueError(f"count is {count}, must be from 1 to {_MOST}")
-        return _axis(key, range(start, start + count), line)
+        return Axis((key,), range(start, start + count), [line])
     if "from" in table:
-        return _axis(key, _range(table), line)
+        return Axis((key,), _range(table), [line])
     if "towards_deg" in table:
         speeds, ways = (_numbers(table, name) for name in ("speed_mps", "towards_deg"))
         winds = [
@@ -121,14 +136,10 @@ def _form(key: str, table: Mapping[str, Any], line: int) -> Axis | Draw:
             for speed in speeds
             for way in (ways if speed else ways[:1])  # still air has no direction
         ]
-        return _axis(key, winds, line)
+        return Axis((key,), winds, [line])
     kind = "uniform" if "uniform" in table else "normal"
     a, b = _two(table, kind)
     return Draw(key, kind, a, b, line)
-
-
-def _axis(key: str, values: Sequence[object], line: int) -> Axis:
-    return Axis((key,), [(v,) for v in values], [line] * len(values))
 
 
 def _range(table: Mapping[str, Any]) -> Sequence[float]:

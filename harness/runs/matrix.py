@@ -31,7 +31,7 @@ class Block:
     draws: Sequence[Draw]
 
     def __len__(self) -> int:
-        return math.prod(len(a.values) for a in self.axes)
+        return math.prod(map(len, self.axes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +80,9 @@ class Matrix:
         values: dict[str, object] = {}
         lines: dict[str, int] = {}
         for a in reversed(block.axes):
-            place, i = divmod(place, len(a.values))
-            values.update(zip(a.keys, a.values[i], strict=True))
-            lines.update(dict.fromkeys(a.keys, a.lines[i]))
+            place, i = divmod(place, len(a))
+            values.update(a.at(i))
+            lines.update(dict.fromkeys(a.keys, a.line(i)))
         if number == 0 and any(all(values.get(k) == v for k, v in table.items()) for table in self.excluded):
             return None
         if block.draws:
@@ -91,6 +91,17 @@ class Matrix:
                 values[draw.key] = draw.value(stream(seed, f"matrix:{draw.key}"))
                 lines[draw.key] = draw.line
         return Combination(position, values, lines)
+
+    @property
+    def varies(self) -> dict[str, int]:
+        """The number of values of each key that is an axis, those of one value too."""
+        found: dict[str, set[object]] = {}
+        for block in self.blocks:
+            for a in block.axes:
+                for key, values in a.choices().items():
+                    numbers = isinstance(values, range)
+                    found.setdefault(key, set()).update(values if numbers else map(repr, values))
+        return {key: len(values) for key, values in found.items()}
 
     def group(self, position: int) -> int:
         """A number that all flights share which differ in the plant alone."""
@@ -101,9 +112,9 @@ class Matrix:
                 continue
             size = 1
             for a in reversed(block.axes):
-                place, i = divmod(place, len(a.values))
+                place, i = divmod(place, len(a))
                 if a.keys != ("plant",):
-                    group, size = group + i * size, size * len(a.values)
+                    group, size = group + i * size, size * len(a)
             return group
         raise IndexError(position)
 
@@ -185,7 +196,7 @@ def _exclusion(
     mistakes: list[str],
 ) -> Mapping[str, object]:
     """The combinations to leave out; empty when there is a mistake in it, or `--set` fixes a key of it."""
-    choices = {key: [v[i] for v in a.values] for a in block.axes for i, key in enumerate(a.keys)}
+    choices = {key: values for a in block.axes for key, values in a.choices().items()}
     checked = {}
     for key, name, value in flattened(table):
         place = f"{file.path}:{_line(file, (*at, *key))}: exclude.{name}"

@@ -13,7 +13,7 @@ import aircraft
 from harness.flight import Flight
 from harness.flight_log import FlightLog
 from harness.key import content_hash, version_of
-from harness.runs.row import Row, final, row_of
+from harness.runs.row import Judged, judged
 from harness.runs.store import Stored, content, find
 from harness.settings import SettingsFile, flight_from_document, overridden
 from harness.simulation import simulate
@@ -81,25 +81,28 @@ class Again(NamedTuple):
 def fly_again(recalled: Recalled) -> Again:
     """Flies the row's flight and compares. ValueError when it cannot start."""
     log = simulate(recalled.flight)
-    return Again(log, deviation(recalled.stored.row, row_of(log), log))
+    return Again(log, deviation(recalled.stored, judged(log)))
 
 
-def deviation(then: Row, now: Row, log: FlightLog) -> str:
+def deviation(stored: Stored, now: Judged) -> str:
     """By how much a flight is not the row's, in words: at its end, and in the metric that differs most."""
-    if then["digest"] == now["digest"]:
+    then = stored.row
+    if then["digest"] == now.digest:
         return ""
-    if then["outcome"] != now["outcome"]:
-        return f"it was {then['outcome']}, it is {now['outcome']}"
+    if then["outcome"] != now.outcome:
+        return f"it was {then['outcome']}, it is {now.outcome}"
     said = []
-    end = final(log)
-    apart = {name: abs(end[name] - x) for name, x in then["final"].items() if name in end}
-    if largest := max(apart, key=lambda name: apart[name] / (1.0 + abs(then["final"][name])), default=None):
+    apart = {name: abs(now.final[name] - x) for name, x in stored.final.items() if name in now.final}
+    if largest := max(apart, key=lambda name: apart[name] / (1.0 + abs(stored.final[name])), default=None):
         said.append(f"{largest} at the end is {apart[largest]:.3g} off (SI)")
-    pairs = {name: (x, now["metrics"].get(name)) for name, x in then["metrics"].items()}
-    moved = {name: abs(a - b) / (abs(a) + abs(b)) for name, (a, b) in pairs.items() if None not in (a, b) and a != b}
-    if largest := max(moved, key=lambda name: moved[name], default=None):
-        before, after = pairs[largest]
-        said.append(f"{largest} was {before:.6g}, is {after:.6g}")
+    moved = {}
+    for name, before in then["metrics"].items():
+        after = now.metrics.get(name)
+        if before is not None and after is not None and before != after:
+            moved[name] = (abs(after - before) / (abs(after) + abs(before)), before, after)
+    if moved:
+        name, (_, before, after) = max(moved.items(), key=lambda item: item[1])
+        said.append(f"{name} was {before:.6g}, is {after:.6g}")
     return ", ".join(said) or "within the flight, not at its end"
 
 

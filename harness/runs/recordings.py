@@ -4,27 +4,28 @@ import json
 from pathlib import Path
 
 from harness.flight_log import FlightLog
-from harness.runs.row import Row
+from harness.runs.row import Judged
+from harness.settings import document
 
 FOLDER = "flights"
 
 
-def record(log: FlightLog, row: Row, folder: Path) -> str:
+def record(log: FlightLog, how: Judged, key: str, folder: Path) -> str:
     """Writes it, and says what went wrong; empty when nothing did."""
     from harness.review.recording import write_recording
 
     metrics = "\n".join(
-        f"| {name} | {'-' if value is None else f'{value:.3g}'} |" for name, value in row["metrics"].items()
+        f"| {name} | {'-' if value is None else f'{value:.3g}'} |" for name, value in how.metrics.items()
     )
-    reason = f": {row['reason']}" if row["reason"] else ""
+    reason = f": {how.reason}" if how.reason else ""
     notes = (
-        f"{row['outcome']}{reason}\n\n| metric | |\n|---|---|\n{metrics}\n\n"
-        f"```json\n{json.dumps(row['flight'], indent=1)}\n```"
+        f"{how.outcome}{reason}\n\n| metric | |\n|---|---|\n{metrics}\n\n"
+        f"```json\n{json.dumps(document(log.flight), indent=1)}\n```"
     )
-    path = recording_path(folder, row["key"])
+    path = recording_path(folder, key)
     try:
         path.parent.mkdir(exist_ok=True)
-        write_recording(path, {log.flight.plant: log}, row["key"], notes)
+        write_recording(path, {log.flight.plant: log}, key, notes)
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
     return ""

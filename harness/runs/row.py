@@ -1,8 +1,7 @@
 """A flight as a row: what `fly --json` prints and the store keeps, the same for both."""
 
 import math
-import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,41 +15,53 @@ from harness.simulation import simulate
 Row = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s
 
 
+class Judged(NamedTuple):
+    """How a flight went; fit for JSON."""
+
+    outcome: str
+    reason: str
+    digest: str
+    metrics: dict[str, float | None]
+    final: dict[str, float]  # see `final`
+    seconds: float | None  # wall time of the simulation
+
+
 def row_of(log: FlightLog) -> Row:
     """The row of a flight; fit for JSON, None where there is no number."""
-    return _row(log.flight, identity(log.flight), log.outcome, log.reason, log.digest, metrics(log))
+    return row(log.flight, identity(log.flight), judged(log))
 
 
-def failed_row(flight: Flight, of: Identity, outcome: Outcome, reason: str) -> Row:
-    """The row of a flight that left no log."""
-    return _row(flight, of, outcome, reason, "", dict.fromkeys(MEANING))
-
-
-def _row(
-    flight: Flight, of: Identity, outcome: Outcome, reason: str, digest: str, judged: dict[str, float | None]
-) -> Row:
+def row(flight: Flight, of: Identity, how: Judged) -> Row:
+    """The row of a flight that went so."""
     margin = math.degrees(feasibility_margin(flight))
     return {
         "key": of.key,
-        "outcome": outcome.value,
-        "reason": reason,
-        "digest": digest,
+        "outcome": how.outcome,
+        "reason": how.reason,
+        "digest": how.digest,
         "flight": of.settings,
-        "metrics": judged,
+        "metrics": how.metrics,
         "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # none without a limit
     }
 
 
-def flown(flight: Flight) -> tuple[Row, FlightLog]:
+def judged(log: FlightLog, seconds: float | None = None) -> Judged:
+    """How the flight went."""
+    return Judged(log.outcome.value, log.reason, log.digest, metrics(log), final(log), seconds)
+
+
+def failed(outcome: Outcome, reason: str) -> Judged:
+    """A flight that left no log."""
+    return Judged(outcome.value, reason, "", dict.fromkeys(MEANING), {}, None)
+
+
+def flown(flight: Flight) -> FlightLog:
     """Flies the flight. What cannot start is an outcome here, `invalid`: one of many must not stop the others."""
-    begin = time.perf_counter()
     try:
-        log = simulate(flight)
+        return simulate(flight)
     except Exception as error:  # of whatever kind: the others have nothing to do with it
         reason = f"{error.key}: {error}" if isinstance(error, PlantError) else f"{type(error).__name__}: {error}"
-        log = FlightLog(flight, Outcome.INVALID, f"it cannot start: {reason}", np.empty((0, len(COLUMNS))))
-    seconds = time.perf_counter() - begin
-    return {**row_of(log), "seconds": seconds, "final": final(log)}, log
+        return FlightLog(flight, Outcome.INVALID, f"it cannot start: {reason}", np.empty((0, len(COLUMNS))))
 
 
 def final(log: FlightLog) -> dict[str, float]:

@@ -4,14 +4,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
-from harness.flight import Flight
 from harness.key import Identity, files, hashed, identity, version_of
+from harness.plant import Outcome
 from harness.runs.estimate import Estimate
 from harness.runs.matrix import Matrix
 from harness.runs.provenance import provenance
-from harness.runs.row import failed_row
+from harness.runs.row import row
 from harness.runs.store import JOURNAL, Store, begun, examples, positions, reading
 from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
@@ -41,16 +40,10 @@ class Progress:
     done: int = 0  # by this one, failed ones included
     failed: int = 0
     out: int = 0  # with the workers
-    outcomes: dict[str, int] = field(default_factory=dict)
     reasons: dict[str, int] = field(default_factory=dict)  # of failures
     recordings: list[str] = field(default_factory=list)  # what went wrong with them
     seconds: float = 0.0  # since the first was sent out
     ahead: float = 0.0  # s of one worker's time, estimated, for what is left
-
-
-class _Pending(NamedTuple):
-    of: Identity
-    flight: Flight
 
 
 def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
@@ -63,7 +56,7 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         store.begin(provenance(matrix.file.path, experiment.title, experiment.question))
         count = len(matrix)
         progress = Progress(count if options.limit is None else min(count, options.limit))
-        pending: dict[str, _Pending] = {}
+        pending: dict[str, Identity] = {}
         estimate = Estimate()
         tasks = _tasks(matrix, store, options, progress, pending)
         flying = fly_all(
@@ -83,27 +76,25 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         yield progress
 
 
-def _keep(store: Store, done: Done, pending: _Pending, progress: Progress) -> None:
-    row = done.row
-    if row is None:
-        row = failed_row(pending.flight, pending.of, done.outcome, done.reason)
-    elif row["key"] != done.task.key:
+def _keep(store: Store, done: Done, of: Identity, progress: Progress) -> None:
+    task, (how, version, problem) = done
+    if version != task.version:
         raise WorkersError(
             "a law, an airframe or a track has changed while flights were flown: run the same command again"
         )
-    if problem := row.pop("recording", ""):
+    if problem:
         progress.recordings.append(problem)
-    store.add(row, pending.of.version, files(pending.flight), done.task.position)
+    store.add_version(version, of.version, files(task.flight))
+    store.add(row(task.flight, of, how), how, version, task.position)
     progress.done += 1
-    progress.outcomes[done.outcome] = progress.outcomes.get(done.outcome, 0) + 1
-    if done.outcome.failed:
+    if Outcome(how.outcome).failed:
         progress.failed += 1
-        reason = f"{done.outcome}: {done.reason}"
+        reason = f"{how.outcome}: {how.reason}"
         progress.reasons[reason] = progress.reasons.get(reason, 0) + 1
 
 
 def _tasks(
-    matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, _Pending]
+    matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, Identity]
 ) -> Iterator[Task]:
     """The flights to be flown, lazily."""
     number = matrix.identifier
@@ -129,8 +120,8 @@ def _tasks(
             progress.earlier += 1
             continue
         known.add(of.key)
-        pending[of.key] = _Pending(of, flight)
-        yield Task(of.key, position, flight, recorded(position))
+        pending[of.key] = of
+        yield Task(of.key, position, flight, hashed(of.version), recorded(position))
 
 
 def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> frozenset[int]:
@@ -162,7 +153,7 @@ def _recorded(matrix: Matrix, options: Options, total: int) -> Callable[[int], s
     log = options.log or ("all" if total <= RECORDED else "sample")
     if log != "sample":
         return lambda position: log
-    plants = max((len(a.values) for block in matrix.blocks for a in block.axes if a.keys == ("plant",)), default=1)
+    plants = max((len(a) for block in matrix.blocks for a in block.axes if a.keys == ("plant",)), default=1)
     groups, wanted = -(-total // plants), max(1, RECORDED // plants)
     stride = -(-groups // wanted)
     return lambda position: "all" if matrix.group(position) % stride == 0 else "none"

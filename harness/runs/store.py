@@ -11,10 +11,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from harness.key import content_hash, hashed
+from harness.key import content_hash
 from harness.plant import Outcome
 from harness.runs.provenance import Provenance, now
-from harness.runs.row import Row
+from harness.runs.row import Judged, Row
 
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
 COMMIT_EVERY = 0.5  # s
@@ -50,7 +50,9 @@ class StoreError(Exception):
 class Stored(NamedTuple):
     """A row as it is kept."""
 
-    row: Row  # as `fly --json` prints it, and `seconds`, `final`
+    row: Row  # as `fly --json` prints it
+    final: Mapping[str, float]  # the flight's last state, see `harness.runs.row`
+    seconds: float | None  # wall time of the simulation
     version: Mapping[str, Any]  # what decided it beside its settings: see `harness.key`
     run: Mapping[str, Any]  # the provenance, and when the run ended
 
@@ -105,23 +107,29 @@ class Store:
         self._change("UPDATE runs SET ended = ? WHERE id = ?", (now(), self._run))
         self.commit()
 
-    def add(self, row: Row, version: Mapping[str, Any], files: Mapping[str, Path], position: int) -> None:
-        """Keeps a row, for good within half a second; `files` are those that `version` has hashes of."""
-        number = hashed(version)
-        if number not in self._versions:
-            for name, path in files.items():
+    def add_version(self, number: str, version: Mapping[str, Any], files: Mapping[str, Path]) -> None:
+        """Keeps what decides flights beside their settings, and the files that it has hashes of."""
+        if number in self._versions:
+            return
+        for name, path in files.items():
+            try:
                 content = path.read_bytes()
-                if content_hash(content) != version["content"][name]:
-                    raise StoreError(f"{path}: has changed while flights were flown: run the same command again")
-                self._change("INSERT OR IGNORE INTO files VALUES (?, ?)", (version["content"][name], content))
-            self._change("INSERT INTO versions VALUES (?, ?)", (number, json.dumps(version)))
-            self._versions.add(number)
+            except OSError as error:
+                raise StoreError(f"{path}: {error.strerror or error}, while flights were flown") from None
+            if content_hash(content) != version["content"][name]:
+                raise StoreError(f"{path}: has changed while flights were flown: run the same command again")
+            self._change("INSERT OR IGNORE INTO files VALUES (?, ?)", (version["content"][name], content))
+        self._change("INSERT INTO versions VALUES (?, ?)", (number, json.dumps(version)))
+        self._versions.add(number)
+
+    def add(self, row: Row, how: Judged, version: str, position: int) -> None:
+        """Keeps a row, for good within half a second."""
         self._change(
             "INSERT OR REPLACE INTO flights VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                row["key"], self._run, position, number, row["outcome"], row["reason"], row["digest"],
+                row["key"], self._run, position, version, row["outcome"], row["reason"], row["digest"],
                 json.dumps(row["flight"]), json.dumps(row["metrics"]), row["feasibility_margin_deg_s"],
-                row.get("seconds"), json.dumps(row.get("final", {})),
+                how.seconds, json.dumps(how.final),
             ),
         )  # fmt: skip
 
@@ -223,10 +231,8 @@ def find(folder: Path, beginning: str) -> Stored:
         "flight": json.loads(kept["settings"]),
         "metrics": json.loads(kept["metrics"]),
         "feasibility_margin_deg_s": kept["feasibility_margin_deg_s"],
-        "seconds": kept["seconds"],
-        "final": json.loads(kept["final"]),
     }
-    return Stored(row, json.loads(kept["decides"]), run)
+    return Stored(row, json.loads(kept["final"]), kept["seconds"], json.loads(kept["decides"]), run)
 
 
 def content(folder: Path, digest: str) -> bytes:

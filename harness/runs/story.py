@@ -63,7 +63,7 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
     yield f"flown by: {run['command']}"
     yield f"at {run['started']}, commit {run['git_commit'] or 'unknown'}{dirty}"
     yield f"on {run['platform']}, Python {run['python']}"
-    if row["seconds"] is not None:
+    if stored.seconds is not None:
         yield f"in {row['seconds']:.3g} s; digest {row['digest'] or 'none'}"
     path = recording_path(folder, row["key"])
     yield (

@@ -64,14 +64,8 @@ def summary(matrix: Matrix, folder: Path) -> tuple[list[str], list[Line]]:
 
 def _axes(matrix: Matrix) -> list[str]:
     """The keys that vary and are not drawn."""
-    drawn = set(matrix.draws)
-    varies: dict[str, set[str]] = {}
-    for block in matrix.blocks:
-        for a in block.axes:
-            for i, key in enumerate(a.keys):
-                varies.setdefault(key, set()).update(repr(v[i]) for v in a.values)
     several = len(matrix.blocks) > 1  # an included flight may differ from the matrix in a key of one value
-    return [key for key, found in varies.items() if (several or len(found) > 1) and key not in drawn]
+    return [key for key, count in matrix.varies.items() if (several or count > 1) and key not in matrix.draws]
 
 
 def _shown(value: object) -> str:

@@ -45,7 +45,11 @@ def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = froz
 
     Raises `SettingsError` at the end with the mistakes that it found.
     """
-    found, seen, starts = Survey(varies=_varies(matrix)), _Seen(), set[object]()
+    found, seen, starts = (
+        Survey(varies={key: count for key, count in matrix.varies.items() if count > 1}),
+        _Seen(),
+        set[object](),
+    )
     for position in range(matrix.positions):
         if limit is not None and found.flights >= limit:
             break
@@ -120,12 +124,3 @@ def _try_start(matrix: Matrix, combination: Combination) -> None:
         try_start(flight)
     except PlantError as error:
         raise SettingsError([f"{matrix.located(combination).locate(error.key)}: {error}"]) from None
-
-
-def _varies(matrix: Matrix) -> dict[str, int]:
-    varies: dict[str, set[str]] = {}
-    for block in matrix.blocks:
-        for a in block.axes:
-            for i, key in enumerate(a.keys):
-                varies.setdefault(key, set()).update(repr(v[i]) for v in a.values)
-    return {key: len(values) for key, values in varies.items() if len(values) > 1}

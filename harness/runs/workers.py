@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 from pebble import ProcessExpired, ProcessPool
 
 from harness.flight import Flight
+from harness.key import hashed, version_of
 from harness.plant import Outcome
 from harness.runs.estimate import CHUNK, Estimate
-from harness.runs.row import Row, flown
+from harness.runs.row import Judged, failed, flown, judged
 
 THREADS = (
     "OMP_NUM_THREADS",
@@ -48,29 +49,43 @@ class Task(NamedTuple):
     key: str
     position: int
     flight: Flight
+    version: str  # a hash of all that decides it beside its settings, as it was when the task was made
     record: str  # when to write a recording: all | failed | none
 
 
+class Flown(NamedTuple):
+    """What a worker answers."""
+
+    how: Judged
+    version: str  # as it was when the flight had been flown
+    recording: str = ""  # what went wrong with writing it, if anything
+
+
 class Done(NamedTuple):
-    """A flight that was flown: its row, or the failure that took the row's place."""
+    """A task, and how it went."""
 
     task: Task
-    row: Row | None
-    outcome: Outcome
-    reason: str = ""
+    flown: Flown
 
 
-Fly = Callable[[Task, Path], Row]
+Fly = Callable[[Task, Path], Flown]
 
 
-def fly_task(task: Task, folder: Path) -> Row:
+def fly_task(task: Task, folder: Path) -> Flown:
     """In a worker: flies it, and writes its recording when asked to."""
-    row, log = flown(task.flight)
+    begin = time.perf_counter()
+    log = flown(task.flight)
+    how = judged(log, time.perf_counter() - begin)
+    problem = ""
     if task.record == "all" or (task.record == "failed" and log.outcome is not Outcome.COMPLETED):
         from harness.runs.recordings import record
 
-        row["recording"] = record(log, row, folder)  # what went wrong, if anything
-    return row
+        problem = record(log, how, task.key, folder)
+    return Flown(how, hashed(version_of(task.flight)), problem)
+
+
+def _failed(task: Task, outcome: Outcome, reason: str) -> Done:
+    return Done(task, Flown(failed(outcome, reason), task.version))
 
 
 @dataclass(slots=True)
@@ -79,7 +94,7 @@ class _Chunk:
     slot: int  # its place in the shared memory
     deaths: int = 0  # of workers before they began its first flight
     hung: bool = False
-    future: Future[list[Row | str]] | None = None
+    future: Future[list[Flown | str]] | None = None
 
 
 def fly_all(
@@ -98,7 +113,7 @@ def fly_all(
     """
     if not workers:
         for task in tasks:
-            yield _done(task, fly(task, folder))
+            yield Done(task, fly(task, folder))
         return
     yield from _Flying(tasks, folder, workers, estimate, timeout, fly).results()
 
@@ -112,7 +127,7 @@ class _Flying:
         self.tasks, self.folder, self.workers, self.timeout, self.fly = tasks, folder, workers, timeout, fly
         self.estimate = estimate
         self.again: deque[_Chunk] = deque()  # to be flown again
-        self.out: dict[Future[list[Row | str]], _Chunk] = {}
+        self.out: dict[Future[list[Flown | str]], _Chunk] = {}
         # For each slot: the number of the flight in its chunk, and since when (the monotonic clock is the machine's).
         # A worker that is being ended may still write to its slot: there are enough to use that one last.
         slots = 16 * AHEAD * workers
@@ -197,17 +212,17 @@ class _Flying:
         assert chunk.future
         self.slots.append(chunk.slot)
         try:
-            rows = chunk.future.result()
+            answers = chunk.future.result()
         except (CancelledError, ProcessExpired, BrokenProcessPool) as error:
             yield from self._lost(chunk, error)
             return
         self.restarts = 0
-        for task, row in zip(chunk.tasks, rows, strict=True):
-            if isinstance(row, str):
-                yield Done(task, None, Outcome.INVALID, row)
+        for task, answer in zip(chunk.tasks, answers, strict=True):
+            if isinstance(answer, str):
+                yield _failed(task, Outcome.INVALID, answer)
             else:
-                self.estimate.learn(task.flight, row["seconds"])
-                yield _done(task, row)
+                self.estimate.learn(task.flight, answer.how.seconds or 0.0)
+                yield Done(task, answer)
 
     def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:
         """The worker of the chunk died or was ended, or all of them are gone."""
@@ -223,10 +238,10 @@ class _Flying:
             task = rest.pop(int(number))
             self.restarts = 0
             if chunk.hung:
-                yield Done(task, None, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
+                yield _failed(task, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
             else:
                 code = getattr(error, "exitcode", None)
-                yield Done(task, None, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
+                yield _failed(task, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
         if rest:
             self.again.append(_Chunk(rest, 0, chunk.deaths))
 
@@ -238,10 +253,6 @@ class _Flying:
             raise WorkersError("the worker processes end as soon as they are started")
         self._stop()
         self.pool = self._pool()
-
-
-def _done(task: Task, row: Row) -> Done:
-    return Done(task, row, Outcome(row["outcome"]), row["reason"])
 
 
 # In a worker
@@ -262,16 +273,16 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _fly_chunk(slot: int, tasks: Sequence[Task]) -> list[Row | str]:
-    """The row of each task, or what went wrong with it."""
+def _fly_chunk(slot: int, tasks: Sequence[Task]) -> list[Flown | str]:
+    """The answer to each task, or what went wrong with it."""
     begun, folder, fly = _SHARED["begun"], _SHARED["folder"], _SHARED["fly"]
-    rows: list[Row | str] = []
+    answers: list[Flown | str] = []
     for number, task in enumerate(tasks):
         begun[2 * slot + 1] = time.monotonic()
         begun[2 * slot] = float(number)
         try:
-            rows.append(fly(task, folder))
+            answers.append(fly(task, folder))
         except Exception as error:  # a fault of the harness, or a file gone: of this flight, not of the others
-            rows.append(f"it could not be flown: {type(error).__name__}: {error}")
+            answers.append(f"it could not be flown: {type(error).__name__}: {error}")
     begun[2 * slot] = _NONE
-    return rows
+    return answers
