@@ -91,16 +91,24 @@ def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | 
     if len(command) < 2 or np.std(command) < LEAST_EXCITATION:
         return None, None
     longest = min(round(LONGEST_LAG / period), len(command) // 2)
-    likeness = np.array([_correlation(command[: len(command) - n], flown[n:]) for n in range(longest + 1)])
+    likeness = _likeness(command, flown, longest)
     n = int(np.argmax(likeness))
     lag = n + (_vertex(likeness[n - 1 : n + 2]) if 0 < n < longest else 0.0)
     u, y = command[: len(command) - n], flown[n:]
     return float(lag * period), float(u @ y / (u @ u))
 
 
-def _correlation(a: Array, b: Array) -> float:
-    a, b = a - a.mean(), b - b.mean()
-    return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-300))
+def _likeness(a: Array, b: Array, longest: int) -> Array:
+    """The correlation of a with b delayed by 0 to `longest` samples, over the samples that both then have."""
+    a, b = a - a.mean(), b - b.mean()  # so that the running sums lose no digits
+    n = np.arange(longest + 1)
+    size = len(a) - n
+    products = np.array([a[: len(a) - k] @ b[k:] for k in n])
+    sum_a, sum_aa = (np.cumsum(x)[size - 1] for x in (a, a * a))
+    sum_b, sum_bb = (np.cumsum(x[::-1])[size - 1] for x in (b, b * b))
+    spread = (sum_aa - sum_a * sum_a / size) * (sum_bb - sum_b * sum_b / size)
+    varied = spread > 1e-20 * (a @ a) * (b @ b)  # else what is left is rounding
+    return np.where(varied, (products - sum_a * sum_b / size) / np.sqrt(np.where(varied, spread, 1.0)), 0.0)
 
 
 def _vertex(y: Array) -> float:
