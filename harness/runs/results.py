@@ -78,7 +78,9 @@ def _table(journal: sqlite3.Connection) -> "pa.Table":
 
     parts = [pa.table(columns) for columns in _columns(journal)]
     if not parts:
-        return pa.table({name: pa.array([], pa.string() if i < 4 else pa.float64()) for i, name in enumerate(_FIRST)})
+        texts = dict.fromkeys((*_FIRST[:4], "version"), pa.string())
+        numbers = dict.fromkeys((*_FIRST[4:], "run", *MEANING), pa.float64())
+        return pa.table({name: pa.array([], kind) for name, kind in {**texts, **numbers}.items()})
     table = pa.concat_tables(parts, promote_options="permissive")
     for name in (*MEANING, *_FIRST[4:]):
         if name in table.column_names:

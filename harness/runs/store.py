@@ -253,7 +253,7 @@ def told(folder: Path) -> Iterator[None]:
         name = getattr(error, "sqlite_errorname", "") or ""
         path = folder / JOURNAL
         if name.startswith("SQLITE_FULL"):
-            why = f"{folder}: the disk is full: finished flights are kept; make room, then run the same command"
+            why = f"{folder}: the disk is full: all but the latest flights are kept; make room, then run it again"
         elif name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
             why = f"{path}: cannot be written: {error}"
         elif name.startswith("SQLITE_IOERR"):

@@ -7,8 +7,11 @@ is flown again.
 
 import multiprocessing
 import os
+import pickle
+import signal
 import threading
 import time
+import zlib
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
@@ -18,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pebble import ProcessExpired, ProcessPool
+from pebble.pool.process import WORKERS_NAME
 
 from harness.flight import Flight
 from harness.key import hashed, version_of
@@ -35,8 +39,12 @@ THREADS = (
 AHEAD = 2  # chunks per worker that are sent out: one in flight, one waiting
 SHORTEST_TIMEOUT = 10.0  # s: below it, a busy machine would decide which flights hang
 _RECORDING = 60.0  # s, that writing a recording may take besides
-_RESTARTS = 3  # of the pool or of a chunk's worker, without any flight done in between
-_NONE = -1.0
+_STALLED = 30.0  # s without any worker at work
+_MOST_RESTARTS = 3  # of the workers, without any flight done in between
+_MOST_TASKS = 64  # in a chunk
+_PIPE = 48_000  # bytes of waiting messages: a full pipe would block, for ever if no worker is left to read it
+_NONE = -1
+_SPAWN = multiprocessing.get_context("spawn")
 
 
 class WorkersError(Exception):
@@ -91,10 +99,10 @@ def _failed(task: Task, outcome: Outcome, reason: str) -> Done:
 @dataclass(slots=True)
 class _Chunk:
     tasks: Sequence[Task]
-    slot: int  # its place in the shared memory
-    deaths: int = 0  # of workers before they began its first flight
-    hung: bool = False
-    future: Future[list[Flown | str]] | None = None
+    slot: int = 0  # its place in the shared memory
+    size: int = 0  # bytes of its message
+    hung: int | None = None  # the number of the flight that took too long
+    deaths: int = 0  # of workers that had it and had begun none of its flights
 
 
 def fly_all(
@@ -131,39 +139,63 @@ class _Flying:
         # For each slot: the number of the flight in its chunk, and since when (the monotonic clock is the machine's).
         # A worker that is being ended may still write to its slot: there are enough to use that one last.
         slots = 16 * AHEAD * workers
-        self.begun = multiprocessing.get_context("spawn").RawArray("d", 2 * slots)
+        self.begun = _SPAWN.RawArray("d", 2 * slots)
         self.slots = deque(range(slots))
         self.pool = self._pool()
-        self.restarts = 0
+        self.restarts = 0  # since a flight was done
+        self.moved = time.monotonic()  # when a worker was last seen with a chunk
 
     def results(self) -> Iterator[Done | None]:
         try:
             while self._send() or self.out:
-                self._end_hung()
                 done, _ = wait(self.out, timeout=0.1, return_when=FIRST_COMPLETED)
                 if not done:
                     yield None
                 for future in done:
-                    yield from self._received(self.out.pop(future))
+                    if chunk := self.out.pop(future, None):
+                        self.slots.append(chunk.slot)
+                        yield from self._received(chunk, future)
+                self._end_hung()
+                if done or any(future.running() for future in self.out):
+                    self.moved = time.monotonic()
+                elif time.monotonic() - self.moved > _STALLED:  # a worker was killed while it held their common lock
+                    self._restart()
         finally:
             self._stop()
 
     def _pool(self) -> ProcessPool:
         for name in THREADS:  # before spawn: a library reads it when it is loaded
-            os.environ.setdefault(name, "1")
-        return ProcessPool(
-            self.workers,
-            initializer=_prepare,
-            initargs=(self.begun, self.folder, self.fly),
-            context=multiprocessing.get_context("spawn"),
-        )
+            os.environ[name] = "1"
+        # Threads and processes started now leave Ctrl-C to this thread.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            pool = ProcessPool(
+                self.workers, initializer=_prepare, initargs=(self.begun, self.folder, self.fly), context=_SPAWN
+            )
+            assert pool.active  # asking starts it
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self.moved = time.monotonic()
+        return pool
 
     def _stop(self) -> None:
         self.pool.stop()  # type: ignore[no-untyped-call]
         for child in multiprocessing.active_children():
-            if child.name == "pebble_pool_worker":
+            if child.name == WORKERS_NAME:
                 child.kill()
         self.pool.join()
+
+    def _restart(self) -> None:
+        """New workers; what the old ones had is flown again."""
+        self.restarts += 1
+        if self.restarts > _MOST_RESTARTS:
+            raise WorkersError("the worker processes end as soon as they are started")
+        self._stop()
+        for chunk in self.out.values():
+            self.slots.append(chunk.slot)
+            self.again.append(chunk)
+        self.out.clear()
+        self.pool = self._pool()
 
     def _send(self) -> bool:
         """Keeps the workers busy; whether there was anything to send."""
@@ -172,48 +204,54 @@ class _Flying:
             chunk = self.again.popleft() if self.again else self._next_chunk()
             if chunk is None:
                 break
-            chunk.slot = self.slots.popleft()
+            message = zlib.compress(pickle.dumps(chunk.tasks), 1)
+            waiting = sum(other.size for future, other in self.out.items() if not future.running())
+            if waiting and waiting + len(message) > _PIPE:
+                self.again.appendleft(chunk)
+                break
+            chunk.slot, chunk.size, chunk.hung = self.slots.popleft(), len(message), None
             self.begun[2 * chunk.slot] = _NONE
             try:
-                chunk.future = self.pool.schedule(_fly_chunk, args=(chunk.slot, chunk.tasks))
-            except RuntimeError:  # the pool broke since
+                future = self.pool.schedule(_fly_chunk, args=(chunk.slot, message))
+            except RuntimeError:  # the pool is broken
                 self.slots.append(chunk.slot)
                 self.again.appendleft(chunk)
                 self._restart()
                 continue
-            self.out[chunk.future] = chunk
+            self.out[future] = chunk
             sent = True
         return sent
 
     def _next_chunk(self) -> _Chunk | None:
         tasks: list[Task] = []
         seconds = 0.0
-        while seconds < CHUNK and (task := next(self.tasks, None)) is not None:
+        while seconds < CHUNK and len(tasks) < _MOST_TASKS and (task := next(self.tasks, None)) is not None:
             tasks.append(task)
             seconds += self.estimate.seconds(task.flight)
-        return _Chunk(tasks, 0) if tasks else None
+        return _Chunk(tasks) if tasks else None
 
     def _end_hung(self) -> None:
         """Has workers killed whose flight takes too long."""
-        for chunk in self.out.values():
+        for future, chunk in self.out.items():
             number, since = self.begun[2 * chunk.slot : 2 * chunk.slot + 2]
-            if number == _NONE or chunk.hung:
+            if number == _NONE or chunk.hung is not None:
                 continue
             if time.monotonic() - since > self._limit(chunk.tasks[int(number)]):
-                chunk.hung = True
-                assert chunk.future
-                chunk.future.cancel()  # Pebble ends the worker of a cancelled task that runs
+                chunk.hung = int(number)
+                future.cancel()  # Pebble ends the worker of a cancelled task that runs
 
     def _limit(self, task: Task) -> float:
         limit = self.timeout or max(SHORTEST_TIMEOUT, 20.0 * self.estimate.seconds(task.flight))
         return limit + (_RECORDING if task.record != "none" else 0.0)
 
-    def _received(self, chunk: _Chunk) -> Iterator[Done]:
-        assert chunk.future
-        self.slots.append(chunk.slot)
+    def _received(self, chunk: _Chunk, future: Future[list[Flown | str]]) -> Iterator[Done]:
         try:
-            answers = chunk.future.result()
-        except (CancelledError, ProcessExpired, BrokenProcessPool) as error:
+            answers = future.result()
+        except BrokenProcessPool:
+            self.again.append(chunk)
+            self._restart()
+            return
+        except (CancelledError, ProcessExpired) as error:
             yield from self._lost(chunk, error)
             return
         self.restarts = 0
@@ -225,34 +263,23 @@ class _Flying:
                 yield Done(task, answer)
 
     def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:
-        """The worker of the chunk died or was ended, or all of them are gone."""
-        number = self.begun[2 * chunk.slot]
+        """The chunk's worker died or was ended: the flight that it was at is lost, the others are flown again."""
+        at = int(self.begun[2 * chunk.slot]) if chunk.hung is None else chunk.hung
         rest = list(chunk.tasks)
-        if isinstance(error, BrokenProcessPool):
-            self._restart()
-        elif number == _NONE:  # died between two flights: nobody's fault, but not for ever
-            chunk.deaths += 1
-            if chunk.deaths > _RESTARTS:
-                raise WorkersError(f"workers die before they can fly: {error}")
-        else:
-            task = rest.pop(int(number))
+        if at != _NONE:
+            task = rest.pop(at)
             self.restarts = 0
-            if chunk.hung:
-                yield _failed(task, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
-            else:
+            if chunk.hung is None:
                 code = getattr(error, "exitcode", None)
                 yield _failed(task, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
+            else:
+                yield _failed(task, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
+        else:  # between two flights: the fault of none
+            chunk.deaths += 1
+            if chunk.deaths > _MOST_RESTARTS:
+                raise WorkersError(f"worker processes end before they can fly: {error}")
         if rest:
-            self.again.append(_Chunk(rest, 0, chunk.deaths))
-
-    def _restart(self) -> None:
-        if self.pool.active:
-            return
-        self.restarts += 1
-        if self.restarts > _RESTARTS:
-            raise WorkersError("the worker processes end as soon as they are started")
-        self._stop()
-        self.pool = self._pool()
+            self.again.append(_Chunk(rest, deaths=chunk.deaths))
 
 
 # In a worker
@@ -273,8 +300,9 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _fly_chunk(slot: int, tasks: Sequence[Task]) -> list[Flown | str]:
-    """The answer to each task, or what went wrong with it."""
+def _fly_chunk(slot: int, message: bytes) -> list[Flown | str]:
+    """The answer to each task of a message, or what went wrong with it."""
+    tasks: list[Task] = pickle.loads(zlib.decompress(message))
     begun, folder, fly = _SHARED["begun"], _SHARED["folder"], _SHARED["fly"]
     answers: list[Flown | str] = []
     for number, task in enumerate(tasks):

@@ -1,0 +1,337 @@
+"""What may go wrong while many flights are flown, really done: killed processes, full disks, damaged files."""
+
+import ctypes
+import os
+import random
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import harness
+from harness.runs.matrix import read_matrix
+from harness.runs.run import Options, Progress, run
+from harness.runs.store import JOURNAL, StoreError, begun, reading
+from harness.runs.workers import Flown, Task, fly_task
+from harness.settings import read_settings
+
+KINEMATIC = """\
+[flight]
+plant = "kinematic"
+duration_s = {duration}
+[flight.law]
+name = "nftsm"
+gains = "paper_1"
+[matrix]
+"start.heading_deg" = {{ uniform = [0.0, 360.0] }}
+seed = {{ start = 0, count = {count} }}
+"""
+
+
+def settings(folder: Path, count: int, duration: float = 2.0, plant: str = "kinematic") -> Path:
+    path = folder / "matrix.toml"
+    path.write_text(KINEMATIC.format(count=count, duration=duration).replace('"kinematic"', f'"{plant}"'))
+    return path
+
+
+def flown(file: Path, out: Path, **options: object) -> Progress:
+    *_, progress = run(read_matrix(read_settings(file)), out, Options(**{"workers": 2, "log": "none", **options}))  # type: ignore[arg-type]
+    return progress
+
+
+def words(file: Path, out: Path, *more: object) -> list[str]:
+    run_it = ["run", str(file), "--out", str(out), "--workers", "2", "--log", "none"]
+    return [sys.executable, "-m", "harness", *run_it, *map(str, more)]
+
+
+def command(file: Path, out: Path, *more: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words(file, out, *more), capture_output=True, text=True, check=False, timeout=120)
+
+
+def started(file: Path, out: Path, *more: object) -> subprocess.Popen[str]:
+    """The command in a session of its own: all processes that it starts can be found by it."""
+    return subprocess.Popen(
+        words(file, out, *more), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def session(leader: int) -> dict[int, str]:
+    """The command lines of the session's processes that are alive."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, _, of = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
+            if int(of) == leader and state != "Z":
+                found[int(folder.name)] = (folder / "cmdline").read_text()
+        except OSError:
+            continue  # ended meanwhile
+    return found
+
+
+def ended(leader: int, within: float) -> bool:
+    """Whether no process of the session is left after so many seconds."""
+    until = time.monotonic() + within
+    while session(leader) and time.monotonic() < until:
+        time.sleep(0.02)
+    return not session(leader)
+
+
+def digests(out: Path) -> dict[str, str]:
+    results = harness.load_results(out)
+    assert results["key"].is_unique
+    return dict(zip(results["key"], results["digest"], strict=True))
+
+
+def runs_of(out: Path) -> dict[str, int]:
+    """Which run flew each flight that is kept."""
+    try:
+        with reading(out) as journal:
+            return dict(journal.execute("SELECT key, run FROM flights")) if begun(journal) else {}
+    except StoreError:
+        return {}  # killed before there was a journal
+
+
+def until(condition: object, process: subprocess.Popen[str], within: float = 60.0) -> None:
+    """Waits until `condition()` holds."""
+    end = time.monotonic() + within
+    while not condition():  # type: ignore[operator]
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_parent_killed_at_ten_moments_loses_no_flight_and_flies_none_twice(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=1000, duration=40.0)
+    flown(file, tmp_path / "undisturbed", workers=0)
+    out, moments = tmp_path / "out", random.Random(4)
+    kept: dict[str, int] = {}
+    killed = 0
+    for i in range(10):
+        process = started(file, out)
+        while i % 2 and process.poll() is None and len(runs_of(out)) == len(kept):
+            time.sleep(0.02)  # every other one is killed in flight, the others perhaps while they start
+        time.sleep(moments.uniform(0.0, 0.3 if i % 2 else 1.2))
+        process.kill()
+        process.communicate()
+        killed += process.returncode == -signal.SIGKILL
+        assert ended(process.pid, within=3.0), session(process.pid)
+        now = runs_of(out)
+        assert kept.items() <= now.items()  # not lost, and not flown again
+        kept = now
+    assert killed >= 5
+    assert kept
+    done = command(file, out)
+    assert done.returncode == 0, done.stderr
+    assert kept.items() <= runs_of(out).items()
+    assert digests(out) == digests(tmp_path / "undisturbed")
+
+
+def die(task: Task, folder: Path) -> Flown:
+    """Flies, but for two flights, where it is killed."""
+    if task.position in (3, 17):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fly_task(task, folder)
+
+
+def test_a_flight_that_kills_its_worker_is_one_row_and_costs_no_other(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=40)
+    flown(file, tmp_path / "undisturbed", workers=0)
+    progress = flown(file, tmp_path / "out", fly=die)
+    assert (progress.done, progress.failed) == (40, 2)
+    results = harness.load_results(tmp_path / "out").set_index("seed")
+    assert results.index[results["outcome"] == "worker_died"].tolist() == [3, 17]
+    assert "exit code -9" in results["reason"][3]
+    alone = harness.load_results(tmp_path / "undisturbed").set_index("seed")
+    others = results["outcome"] == "completed"
+    assert others.sum() == 38
+    assert (results["digest"][others] == alone["digest"][others]).all()
+    assert flown(file, tmp_path / "out").done == 0  # a failure is a row: it is flown again only when asked to
+    assert flown(file, tmp_path / "out", retry_failed=True).done == 2
+    assert digests(tmp_path / "out") == digests(tmp_path / "undisturbed")
+
+
+def test_a_worker_that_is_killed_from_outside_is_one_row(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=3, duration=1000.0, plant="sixdof")
+    process = started(file, tmp_path / "out")
+
+    def busy() -> list[int]:
+        """Workers that have used some processor time: they fly."""
+        found = []
+        for pid, line in session(process.pid).items():
+            if "spawn_main" in line:
+                used = sum(map(int, Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]))
+                found += [pid] if used > 1.3 * os.sysconf("SC_CLK_TCK") else []
+        return found
+
+    until(busy, process)
+    os.kill(busy()[0], signal.SIGKILL)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 1, errors
+    assert Counter(harness.load_results(tmp_path / "out")["outcome"]) == {"completed": 2, "worker_died": 1}
+
+
+def hang(task: Task, folder: Path) -> Flown:
+    """Flies, but for two flights: one sleeps, one is lost in a library that lets no signal through."""
+    if task.position == 2:
+        time.sleep(1000.0)
+    if task.position == 5:
+        ctypes.PyDLL(None).sleep(1000)
+    return fly_task(task, folder)
+
+
+def test_a_flight_that_hangs_is_ended_and_costs_no_other(tmp_path: Path) -> None:
+    begin = time.monotonic()
+    progress = flown(settings(tmp_path, count=12), tmp_path / "out", fly=hang, timeout=1.0)
+    assert time.monotonic() - begin < 25.0
+    assert progress.failed == 2
+    results = harness.load_results(tmp_path / "out")
+    assert results["outcome"].tolist() == ["timeout" if i in (2, 5) else "completed" for i in range(12)]
+    assert results["reason"][2] == "ended after 1 s"
+
+
+def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=5000, duration=100.0)
+    process = started(file, tmp_path / "out")
+    until(lambda: runs_of(tmp_path / "out"), process)
+    begin = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process
+    _, errors = process.communicate(timeout=20)
+    assert time.monotonic() - begin < 2.0
+    assert process.returncode == 130, errors
+    assert ended(process.pid, within=0.2), session(process.pid)
+    assert "the same command goes on" in errors
+    assert errors.splitlines()[-1] == "interrupted"
+    assert "Traceback" not in errors
+    assert len(harness.load_results(tmp_path / "out")) > 0
+
+
+def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=5000, duration=100.0)
+    first = started(file, tmp_path / "out")
+    try:
+        until(lambda: runs_of(tmp_path / "out"), first)
+        second = command(file, tmp_path / "out")
+        assert second.returncode == 2
+        assert "another run writes there" in second.stderr.splitlines()[-1]
+        assert str(first.pid) in second.stderr
+    finally:
+        first.send_signal(signal.SIGINT)
+        first.communicate(timeout=20)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 2 MB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"no file system can be mounted here: {mounted.stderr.strip()}")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def remount(disk: Path, options: str) -> None:
+    subprocess.run(["mount", "-o", f"remount,{options}", str(disk)], check=True)
+
+
+def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Path, small_disk: Path) -> None:
+    file = settings(tmp_path, count=900, duration=20.0)
+    done = command(file, small_disk / "out")
+    assert done.returncode == 2
+    assert "disk is full" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+    kept = runs_of(small_disk / "out")
+    assert 0 < len(kept) < 900
+    remount(small_disk, "size=50m")
+    again = command(file, small_disk / "out")
+    assert again.returncode == 0, again.stderr
+    assert kept.items() <= runs_of(small_disk / "out").items()
+    assert len(digests(small_disk / "out")) == 900
+
+
+def test_a_directory_that_can_only_be_read_is_told_and_still_read(tmp_path: Path, small_disk: Path) -> None:
+    file = settings(tmp_path, count=5)
+    flown(file, small_disk / "out", workers=0)
+    remount(small_disk, "ro")
+    for out in (small_disk / "out", small_disk / "new"):
+        done = command(file, out)
+        assert done.returncode == 2
+        assert "cannot be written" in done.stderr.splitlines()[-1]
+        assert "Traceback" not in done.stderr
+    assert len(harness.load_results(small_disk / "out")) == 5
+
+
+def damage(path: Path, how: str) -> None:
+    content = bytearray(path.read_bytes())
+    if how == "no database":
+        content[:] = b"no database " * 1000
+    elif how == "cut":
+        del content[len(content) // 2 :]
+    elif how == "overwritten":
+        middle = len(content) // 2
+        content[middle : middle + 6000] = random.Random(1).randbytes(6000)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("how", ["no database", "cut", "overwritten", "of another program"])
+def test_a_damaged_journal_is_told_and_left_as_it_is(tmp_path: Path, how: str) -> None:
+    file, out = settings(tmp_path, count=30), tmp_path / "out"
+    flown(file, out, workers=0)
+    if how == "of another program":
+        (out / JOURNAL).unlink()
+        with sqlite3.connect(out / JOURNAL) as other:
+            other.execute("CREATE TABLE mine (x)")
+        other.close()
+    else:
+        damage(out / JOURNAL, how)
+    before = (out / JOURNAL).read_bytes()
+    file.write_text(file.read_text().replace("count = 30", "count = 31"))
+    done = command(file, out)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith(f"{out / JOURNAL}: is ")
+    assert "nothing was changed" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (out / JOURNAL).read_bytes() == before
+
+
+def test_settings_changed_in_between_are_new_flights_and_the_old_stay(tmp_path: Path) -> None:
+    file, out = settings(tmp_path, count=4), tmp_path / "out"
+    flown(file, out, workers=0)
+    old = digests(out)
+    file.write_text(file.read_text().replace("paper_1", "paper").replace("count = 4", "count = 6"))
+    progress = flown(file, out, workers=0)
+    assert (progress.done, progress.earlier) == (6, 0)
+    assert len(digests(out)) == 10
+    assert old.items() <= digests(out).items()
+
+
+def test_the_hundredth_flight_of_a_worker_is_its_first(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=101, duration=1.0, plant="sixdof")
+    flown(file, tmp_path / "out", workers=1)
+    shutil.copy(file, tmp_path / "last.toml")
+    last = tmp_path / "last.toml"
+    last.write_text(file.read_text().replace("start = 0, count = 101", "start = 100, count = 1"))
+    flown(last, tmp_path / "last", workers=1)
+    assert digests(tmp_path / "last").items() <= digests(tmp_path / "out").items()
+
+
+def test_a_worker_has_one_numeric_thread(tmp_path: Path) -> None:
+    flown(settings(tmp_path, count=1), tmp_path / "out", fly=threads)
+    (reason,) = harness.load_results(tmp_path / "out")["reason"]
+    assert reason == "it could not be flown: RuntimeError: 1 1 1"
+
+
+def threads(task: Task, folder: Path) -> Flown:
+    """Fails, and tells how many threads the numeric libraries would use."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    raise RuntimeError(" ".join(os.environ.get(name, "many") for name in names))
