@@ -1,0 +1,116 @@
+"""A comparison: everything that the flights of one directory say of the plants, computed once for all its readers."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from harness.metrics import MEANING
+from harness.verdict.assess import Assess
+from harness.verdict.attribution import LADDER, Attribution, attributions
+from harness.verdict.pairs import FAILED, Pairs, axes, entered, plant_pairs, spread, varying
+from harness.verdict.parts import with_quantities
+from harness.verdict.scorecard import Scorecard, scorecards
+from harness.verdict.statistics import Effect, effect
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A metric of one airframe under one law: the baseline's mean, the plant's, their paired difference."""
+
+    aircraft: str
+    law: str
+    plant: str
+    metric: str
+    reference: float  # NaN where the baseline has no such thing
+    other: float
+    difference: Effect
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """A flight that is in no pair."""
+
+    key: str
+    outcome: str
+    settings: Mapping[str, object]  # those that vary
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What `harness compare` prints and `harness report` draws."""
+
+    baseline: str
+    assess: Assess
+    flights: int
+    pairs: Pairs  # as they entered
+    unpaired: tuple[Left, ...]
+    failed: tuple[Left, ...]
+    rows: tuple[Row, ...]
+    scorecards: tuple[Scorecard, ...]
+    attributions: tuple[Attribution, ...]
+
+    @property
+    def last_plant(self) -> str:
+        """The plant furthest up the ladder: the one the answer is about."""
+        plants = [card.plant for card in self.scorecards]
+        return max(plants, key=lambda plant: list(LADDER).index(plant) if plant in LADDER else -1)
+
+    @property
+    def answering(self) -> list[Scorecard]:
+        """Its scorecards."""
+        return [card for card in self.scorecards if card.plant == self.last_plant]
+
+
+def compare(flights: pd.DataFrame, assess: Assess, baseline: str = "kinematic") -> Comparison:
+    """Of a directory's flights. Raises `CompareError` with what is missing."""
+    table = with_quantities(entered(flights))
+    paired = plant_pairs(table, baseline)
+    failed = table["outcome"].isin(FAILED)
+    return Comparison(
+        baseline,
+        assess,
+        len(flights),
+        paired,
+        tuple(_left(paired.unpaired, table)),
+        tuple(_left(table[failed], table)),
+        tuple(_rows(paired)),
+        tuple(scorecards(paired, assess, baseline)),
+        tuple(attributions(table[~failed])),
+    )
+
+
+def _left(those: pd.DataFrame, table: pd.DataFrame) -> Iterator[Left]:
+    columns = varying(table)
+    for _, flight in those.iterrows():
+        yield Left(str(flight["key"]), str(flight["outcome"]), {column: flight[column] for column in columns})
+
+
+def _rows(paired: Pairs) -> Iterator[Row]:
+    named = spread(paired.other)
+    law = named["law"] if "law" in named else pd.Series("", index=named.index)
+    kinds = pd.DataFrame({"aircraft": paired.other["aircraft"], "law": law, "plant": paired.other["plant"]})
+    for aircraft, label, plant in (
+        kinds.drop_duplicates().sort_values(["aircraft", "law", "plant"]).itertuples(index=False)
+    ):
+        those = paired.where((kinds == [aircraft, label, plant]).all(axis=1))
+        for metric in MEANING:
+            reference, other = those.reference[metric].to_numpy(float), those.other[metric].to_numpy(float)
+            if np.isnan(other).all():
+                continue
+            change = other - reference
+            there = ~np.isnan(change)
+            seeds = those.other["seed"].to_numpy()[there]
+            found = effect(change[there], seeds, f"{aircraft} {label} {plant} {metric}")
+            yield Row(str(aircraft), str(label), str(plant), metric, _mean(reference), _mean(other), found)
+
+
+def _mean(values: Sequence[float] | np.ndarray) -> float:
+    there = np.asarray(values)[~np.isnan(values)]
+    return float(there.mean()) if len(there) else float("nan")
+
+
+def axes_of(comparison: Comparison) -> dict[str, list[object]]:
+    """What was set to several values, over all airframes."""
+    return axes(spread(comparison.pairs.other), without=("plant",))

@@ -1,0 +1,131 @@
+"""The parts of the assumption and its consequences: what each measures, and within what it holds."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+import aircraft
+from harness.verdict.assess import Assess
+
+Bounds = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One part: a column of both flights of a pair, whose difference has to stay within bounds."""
+
+    name: str
+    title: str
+    column: str
+    unit: str
+    bounds: Callable[[Assess], Bounds]  # of the difference, in the column's unit
+    assumed: float | None = None  # what the assumption says it is; None: what the baseline flew
+    relative: bool = False  # bounds are shares of the baseline's value
+    threshold: str = ""  # the key in [assess]
+    consequence: bool = False
+    tested: bool = True  # False: a setting, or a share of flights, of which a cell has too few for a test
+
+    def difference(self, reference: pd.DataFrame, other: pd.DataFrame) -> pd.Series:
+        """Other minus what is assumed of it; NaN where it was not measured."""
+        return other[self.column] - (reference[self.column] if self.assumed is None else self.assumed)
+
+
+def _up_to(limit: Callable[[Assess], float]) -> Callable[[Assess], Bounds]:
+    return lambda assess: (None, limit(assess))
+
+
+def _within(margin: Callable[[Assess], float]) -> Callable[[Assess], Bounds]:
+    return lambda assess: (-margin(assess), margin(assess))
+
+
+PARTS: tuple[Part, ...] = (
+    Part(
+        "airspeed", "constant airspeed", "airspeed_deviation", "of nominal, rms",
+        _up_to(lambda a: a.airspeed_deviation), 0.0, threshold="airspeed_deviation",
+    ),
+    Part(
+        "gain", "heading rate followed: gain", "heading_rate_gain", "of the command",
+        _within(lambda a: a.heading_rate_gain), 1.0, threshold="heading_rate_gain",
+    ),
+    Part(
+        "lag", "heading rate followed: lag", "heading_rate_lag_s", "s",
+        _up_to(lambda a: a.heading_rate_lag), 0.0, threshold="heading_rate_lag_s",
+    ),
+    Part(
+        "lag_k2", "heading rate followed: lag x k2", "lag_times_k2", "1",
+        _up_to(lambda a: a.lag_times_k2), 0.0, threshold="lag_times_k2",
+    ),
+    Part(
+        "sideslip", "zero sideslip", "sideslip_rms_deg", "deg rms",
+        _up_to(lambda a: math.degrees(a.sideslip)), 0.0, threshold="sideslip_deg",
+    ),
+    Part(
+        "level", "level flight", "altitude_deviation_peak_m", "m peak",
+        _up_to(lambda a: a.altitude_deviation), 0.0, threshold="altitude_deviation_m",
+    ),
+    Part(
+        "turn", "turn relation g tan(bank)/V", "turn_ratio", "of the relation",
+        _within(lambda a: a.turn_ratio), 1.0, threshold="turn_ratio",
+    ),
+    Part(
+        "reach", "rate limit within reach of the bank limit", "bank_beyond_deg", "deg beyond the bank limit",
+        _up_to(lambda a: -math.degrees(a.bank_reserve)), 0.0, threshold="bank_reserve_deg", tested=False,
+    ),
+    Part(
+        "alive", "flights that last", "lost_share", "of the flights lost",
+        _up_to(lambda a: a.lost_share), 0.0, threshold="lost_share", consequence=True, tested=False,
+    ),
+    Part(
+        "convergence", "convergence itself", "converged_share", "of the flights",
+        _within(lambda a: a.convergence_share_margin), threshold="convergence_share_margin", consequence=True,
+        tested=False,
+    ),
+    Part(
+        "convergence_time", "convergence time", "convergence_time_s", "s",
+        _within(lambda a: a.convergence_time_margin), relative=True,
+        threshold="convergence_time_margin", consequence=True,
+    ),
+    Part(
+        "settled_error", "settled error", "range_error_rms_m", "m rms",
+        _within(lambda a: a.range_error_margin), threshold="range_error_margin_m", consequence=True,
+    ),
+    Part(
+        "saturation", "saturation", "saturation_fraction", "of the last half",
+        _within(lambda a: a.saturation_margin), threshold="saturation_margin", consequence=True,
+    ),
+    Part(
+        "activity", "command activity", "command_activity_deg_s2", "deg/s2",
+        _within(lambda a: math.degrees(a.command_activity_margin)),
+        threshold="command_activity_margin_deg_s2", consequence=True,
+    ),
+)  # fmt: skip
+
+
+def with_quantities(table: pd.DataFrame) -> pd.DataFrame:
+    """The entered flights with the columns that the parts need beside the metrics."""
+    k2 = table.get("law.k2", np.nan)
+    bank = np.degrees(np.arctan(table["start.airspeed_mps"] * _limit(table) / 9.80665))
+    limits = {name: _bank_limit_deg(name) for name in set(table["aircraft"])}
+    banked = ~table["plant"].isin(["kinematic", "lagged"])  # these turn without banking
+    return table.assign(
+        airspeed_deviation=table["airspeed_deviation_rms_mps"] / table["start.airspeed_mps"],
+        lag_times_k2=table["heading_rate_lag_s"] * k2,
+        bank_beyond_deg=(bank - table["aircraft"].map(limits)).where(banked),
+        lost_share=table["lost"].astype(float),
+        converged_share=table["converged"].astype(float),
+    )
+
+
+def _limit(table: pd.DataFrame) -> pd.Series:
+    return table["law.max_heading_rate_deg_s"].map(lambda limit: math.radians(float(limit)))
+
+
+def _bank_limit_deg(name: str) -> float:
+    """NaN for an airframe that is not here any more."""
+    try:
+        return math.degrees(aircraft.bank_limit(aircraft.folder(name)))
+    except OSError:
+        return math.nan

@@ -1,0 +1,200 @@
+"""The report: a comparison as one self-contained page, and as the Markdown of `docs/results.md`."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from harness.settings.written import written
+from harness.verdict import figures, words
+from harness.verdict.attribution import METRICS, Attribution
+from harness.verdict.comparison import Comparison, axes_of
+from harness.verdict.pairs import settings_of, varying
+from harness.verdict.scorecard import Finding, Scorecard, shown
+from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
+
+MOST_FLIGHTS = 60  # pairs listed on a page
+MOST_DRAWN = 12  # airframes and laws whose attribution is drawn: the page stays below 3 MB
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where the flights come from: what heads the page."""
+
+    folder: str
+    title: str
+    question: str
+    command: str  # that flew them
+    flown: str  # when, and with which code
+
+
+class Figure(NamedTuple):
+    """An SVG and what it shows."""
+
+    svg: str
+    caption: str
+
+
+class Listed(NamedTuple):
+    """A pair of flights, why it is listed, and how to see it."""
+
+    why: str
+    plant: str
+    settings: str
+    outcome: str
+    keys: tuple[str, str]
+    command: str
+
+
+class Shading(NamedTuple):
+    """The share of a part's cells that pass at one value of an axis."""
+
+    axis: str
+    value: str
+    passed: int
+    of: int
+
+
+def page(comparison: Comparison, origin: Origin) -> str:
+    """The HTML page."""
+    return _rendered("report.html.jinja", comparison, origin, autoescape=True)
+
+
+def markdown(comparison: Comparison, origin: Origin) -> str:
+    """The same without figures and flights, for `docs/results.md`."""
+    return _rendered("results.md.jinja", comparison, origin, autoescape=False)
+
+
+def _rendered(template: str, comparison: Comparison, origin: Origin, *, autoescape: bool) -> str:
+    environment = Environment(
+        loader=PackageLoader("harness.verdict", "."),
+        autoescape=autoescape,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    html = template.endswith("html.jinja")
+    return environment.get_template(template).render(
+        comparison=comparison,
+        origin=origin,
+        answer=words.answer(comparison),
+        heading=list(words.heading(comparison)),
+        axes={axis: [shown(value) for value in values] for axis, values in axes_of(comparison).items()},
+        margins=written(comparison.assess),
+        words=words,
+        metrics=METRICS,
+        shading=shading,
+        breaks_first=words.breaks_first,
+        distributions=_distributions(comparison) if html else None,
+        attributions=[
+            (a, _attributed(a) if html else []) for a in comparison.attributions[: MOST_DRAWN if html else None]
+        ],
+        undrawn=max(0, len(comparison.attributions) - MOST_DRAWN),
+        listed=list(listed(comparison, origin.folder)) if html else [],
+        confidence=f"{100 * CONFIDENCE:.0f} %",
+        resamples=RESAMPLES,
+        least_seeds=LEAST_SEEDS,
+    )
+
+
+def _distributions(comparison: Comparison) -> Figure:
+    plant = comparison.last_plant
+    return Figure(
+        figures.draw(partial(figures.distributions, comparison=comparison, plant=plant), height=3.4),
+        f"Paired differences, {plant} minus {comparison.baseline}: the share of pairs below. Shaded: the margin, where "
+        "it is absolute. A flight that ended early enters with the worst value, one that never converges with "
+        "its duration.",
+    )
+
+
+def _attributed(attribution: Attribution) -> list[Figure]:
+    """The waterfall and the disturbances of one airframe under one law, as far as they were flown."""
+    found = []
+    if attribution.ladders:
+        found.append(
+            Figure(
+                figures.draw(partial(figures.waterfall, attribution=attribution), height=4.6),
+                f"What each rung adds, in the mean over the {attribution.scenarios} scenarios flown on all of them; a "
+                "dark line is the 95 % interval of that step.",
+            )
+        )
+    if attribution.disturbances:
+        whats = len({step.what for step in attribution.disturbances})
+        found.append(
+            Figure(
+                figures.draw(partial(figures.disturbances, attribution=attribution), height=1.5 + 0.4 * whats),
+                "What each disturbance adds to the same flight without it, all else equal.",
+            )
+        )
+    return found
+
+
+def shading(card: Scorecard, finding: Finding) -> Iterator[Shading]:
+    """Where a part passes: per axis and value."""
+    for axis, values in card.axes.items():
+        for value in values:
+            there = [cell for cell in finding.cells if cell.at[axis] == value]
+            yield Shading(axis, shown(value), sum(cell.passes for cell in there), len(there))
+
+
+def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
+    """The pairs worth a look: per airframe and plant the lost, the worst of each consequence and the middle one."""
+    pairs = comparison.pairs
+    columns = [c for c in varying(pairs.other) if c in settings_of(pairs.other) and not _follows_law(c)]
+    for index, why in list(_chosen(comparison).items())[:MOST_FLIGHTS]:
+        before, after = pairs.reference.loc[index], pairs.other.loc[index]
+        keys = str(before["key"])[:12], str(after["key"])[:12]
+        yield Listed(
+            "; ".join(why),
+            f"{after['plant']} {after['aircraft']}",
+            ", ".join(f"{c} = {_setting(after[c])}" for c in columns if c not in ("plant", "aircraft")),
+            str(after["outcome"]),
+            keys,
+            f"harness view {folder} --flight {keys[0]} --flight {keys[1]}",
+        )
+
+
+def _follows_law(column: str) -> bool:
+    """A gain says nothing that the law and its set do not."""
+    from autopilot.laws import LAWS
+
+    return column.startswith("law.") and any(
+        column.removeprefix("law.") in gains for law in LAWS.values() for gains in law.gain_sets.values()
+    )
+
+
+def _setting(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"({', '.join(_setting(element) for element in value)})"
+    return f"{value + 0.0:.4g}" if isinstance(value, float | np.floating) else str(value)  # + 0.0: no minus zero
+
+
+def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
+    """Rows of the pairs, and why each was chosen."""
+    chosen: dict[int, list[str]] = {}
+    other, reference = comparison.pairs.other, comparison.pairs.reference
+    for rows in other.groupby(["aircraft", "plant"]).groups.values():
+        for metric in ("range_error_rms_m", "convergence_time_s", "command_activity_deg_s2"):
+            change = (other.loc[rows, metric] - reference.loc[rows, metric]).sort_values()
+            if change.iloc[-1] > 0:
+                _add(chosen, change.index[-1], f"{METRICS[metric][0]} worst, {words.signed(change.iloc[-1])}")
+            if metric == "range_error_rms_m":
+                middle = change.index[len(change) // 2]
+                _add(chosen, middle, f"{METRICS[metric][0]} in the middle, {words.signed(change.loc[middle])}")
+    for index in other.index[other["lost"]]:
+        _add(chosen, index, str(other.loc[index, "reason"]) or "ended early")
+    return chosen
+
+
+def _add(chosen: dict[int, list[str]], index: object, why: str) -> None:
+    chosen.setdefault(int(str(index)), []).append(why)
+
+
+def origin_of(folder: str, run: Mapping[str, object]) -> Origin:
+    """From a run's provenance."""
+    commit = str(run["git_commit"] or "unknown")[:12] + (" with changes" if run["git_dirty"] else "")
+    flown = f"{run['started']}, commit {commit}, Python {run['python']}, {run['platform']}"
+    return Origin(folder, str(run["title"] or folder), str(run["question"] or ""), str(run["command"]), flown)

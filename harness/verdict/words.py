@@ -1,0 +1,235 @@
+"""A comparison in words: every sentence made of its numbers alone."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+from harness.commands.telling import number
+from harness.verdict.comparison import Comparison, Left, Row
+from harness.verdict.scorecard import HOLDS, IF, NOT, UNMEASURED, UNSHOWN, Cell, Finding, Scorecard, shown
+from harness.verdict.statistics import Effect, Share
+
+UNITS = {"deg_s2": "deg/s2", "deg_s": "deg/s", "mps2": "m/s2", "mps": "m/s", "deg": "deg", "m": "m", "s": "s"}
+
+
+def answer(comparison: Comparison) -> list[str]:
+    """Three sentences: does the assumption hold, what breaks first, what does it cost."""
+    cards = comparison.answering
+    beside = f"{comparison.last_plant} beside {comparison.baseline}, {sum(card.pairs for card in cards)} pairs"
+    return [
+        f"Does it hold? {_sentence(map(_holds, cards))} ({beside}).",
+        f"What breaks first? {_sentence(map(_first, cards))}.",
+        f"What does it cost? {_sentence(map(_costs, cards))}.",
+    ]
+
+
+def _holds(card: Scorecard) -> str:
+    parts = [finding for finding in card.findings if not finding.part.consequence and finding.verdict != UNMEASURED]
+    counted = {verdict: sum(f.verdict == verdict for f in parts) for verdict in (HOLDS, IF, NOT, UNSHOWN)}
+    if counted[HOLDS] == len(parts):
+        return f"on {card.aircraft} all {len(parts)} parts hold"
+    said = [f"{counted[HOLDS]} of {len(parts)} parts hold"]
+    said += [f"{counted[IF]} under a condition"] if counted[IF] else []
+    said += [f"{counted[NOT]} {'do' if counted[NOT] > 1 else 'does'} not"] if counted[NOT] else []
+    said += [f"{counted[UNSHOWN]} not shown"] if counted[UNSHOWN] else []
+    return f"on {card.aircraft} not as a whole: {_and(said)}"
+
+
+def breaks_first(card: Scorecard) -> Finding | None:
+    """The part of the assumption that passes in the smallest share of its cells; of equals, the one furthest out."""
+    broken = [f for f in card.findings if not f.part.consequence and f.cells and f.passed < len(f.cells)]
+    return min(broken, key=lambda f: (f.passed / len(f.cells), -_use(f)), default=None)
+
+
+def _use(finding: Finding) -> float:
+    return finding.worst.use if finding.worst else 0.0
+
+
+def _first(card: Scorecard) -> str:
+    finding = breaks_first(card)
+    if finding is None or finding.worst is None:
+        return f"on {card.aircraft} nothing"
+    where = f", holds if {finding.condition}" if finding.condition else ""
+    worst = finding.worst
+    return (
+        f"on {card.aircraft} {finding.part.title}: within its bound in {finding.passed} of {len(finding.cells)} cells"
+        f"{where}, at worst {measured(worst.mean, finding)} where {bound(worst)} is asked{place(worst)}"
+    )
+
+
+def place(cell: Cell) -> str:
+    """Where a cell is, or nothing when there is but one."""
+    return f" at {', '.join(f'{axis} = {shown(value)}' for axis, value in cell.at.items())}" if cell.at else ""
+
+
+def _costs(card: Scorecard) -> str:
+    time, error, activity = (card.finding(name) for name in ("convergence_time", "settled_error", "activity"))
+    before, after = card.converged
+    said = [f"{_percent(after.share)} of the flights converge instead of {_percent(before.share)}"]
+    if time.cells:
+        said.append(f"convergence {short(time.effect)} s")
+    said.append(f"settled error {short(error.effect)} m rms")
+    said.append(f"command activity {short(activity.effect)} deg/s2")
+    if card.lost.number:
+        said.append(f"{card.lost.number} of {card.lost.of} flights end early")
+    return f"on {card.aircraft} {', '.join(said)}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def _and(words: Sequence[str]) -> str:
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def _sentence(clauses: Iterable[str]) -> str:
+    whole = "; ".join(clauses)
+    return whole[:1].upper() + whole[1:]
+
+
+# Numbers
+
+
+def signed(value: float) -> str:
+    """Three digits with a sign, or a dash for none."""
+    text = plain(value)
+    return f"+{text}" if value > 0 and text != "0" else text
+
+
+def plain(value: float) -> str:
+    """Three digits, or a dash for none."""
+    return number(None if math.isnan(value) else value)
+
+
+def short(effect: Effect) -> str:
+    """The mean with its interval when it has one."""
+    if effect.low is None or effect.high is None:
+        return signed(effect.mean)
+    return f"{signed(effect.mean)} [{signed(effect.low)}, {signed(effect.high)}]"
+
+
+def of(share: Share) -> str:
+    """A share with its interval."""
+    return f"{share.number} of {share.of} ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
+
+
+def bound(cell: Cell) -> str:
+    """What a cell's difference has to stay within."""
+    low, high = cell.bounds
+    if low is None:
+        return f"at most {plain(high if high is not None else math.nan)}"
+    return f"within ±{plain(high)}" if high == -low else f"{signed(low)} to {signed(high or math.nan)}"
+
+
+def measured(value: float, finding: Finding) -> str:
+    """A difference with its unit."""
+    unit = finding.part.unit
+    return signed(value) if unit == "1" else f"{signed(value)} {unit}"
+
+
+def verdict(finding: Finding) -> str:
+    """The verdict with its condition."""
+    return f"{finding.verdict} {finding.condition}".strip()
+
+
+def unit_of(metric: str) -> str:
+    """The unit that a metric's name ends with."""
+    return next((unit for suffix, unit in UNITS.items() if metric.endswith(f"_{suffix}")), "1")
+
+
+# Lines for a terminal
+
+
+def lines(comparison: Comparison) -> Iterator[str]:
+    """All of it, for a terminal."""
+    yield from heading(comparison)
+    yield ""
+    yield from table_lines(comparison.rows, comparison.baseline)
+    for card in comparison.scorecards:
+        yield ""
+        yield from scorecard_lines(card)
+    yield ""
+    yield from answer(comparison)
+
+
+def heading(comparison: Comparison) -> Iterator[str]:
+    """What was compared, and what could not be."""
+    plants = sorted({card.plant for card in comparison.scorecards})
+    seeds = comparison.pairs.other["seed"].nunique()
+    yield (
+        f"{len(comparison.pairs)} pairs of {', '.join(plants)} beside {comparison.baseline}, {seeds} "
+        f"seed{'s' if seeds != 1 else ''}, from {comparison.flights} flights"
+    )
+    yield from _left("have no partner", comparison.unpaired)
+    yield from _left("failed and are in no pair", comparison.failed)
+
+
+MOST_LISTED = 10
+
+
+def _left(what: str, left: Sequence[Left]) -> Iterator[str]:
+    if not left:
+        return
+    yield f"{len(left)} flights {what}:"
+    for flight in left[:MOST_LISTED]:
+        settings = ", ".join(f"{key} = {shown(value)}" for key, value in flight.settings.items())
+        yield f"  {flight.key[:12]} {flight.outcome}: {settings}"
+    if len(left) > MOST_LISTED:
+        yield f"  and {len(left) - MOST_LISTED} more (all in --json)"
+
+
+def table_lines(rows: Sequence[Row], baseline: str) -> Iterator[str]:
+    """The paired differences, a block per airframe, law and plant."""
+    for kind in dict.fromkeys((row.aircraft, row.law, row.plant) for row in rows):
+        those = [row for row in rows if (row.aircraft, row.law, row.plant) == kind]
+        pairs = max(row.difference.pairs for row in those)
+        yield f"{kind[0]}, {kind[1]}: {kind[2]} - {baseline}, {pairs} pairs"
+        head = ("", baseline, kind[2], "difference", "95 % interval", "pairs")
+        yield from aligned([head, *(_cells(row) for row in those)])
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    change = row.difference
+    if change.low is None or change.high is None:
+        between = change.why if change.pairs else ""
+    else:
+        between = f"{signed(change.low)} to {signed(change.high)}"
+    mean = signed(change.mean)
+    return row.metric, plain(row.reference), plain(row.other), mean, between, str(change.pairs)
+
+
+def scorecard_lines(card: Scorecard) -> Iterator[str]:
+    """One airframe's scorecard."""
+    lost, before, after = of(card.lost), of(card.converged[0]), of(card.converged[1])
+    yield f"Scorecard of {card.aircraft}, {card.plant} beside {card.baseline}: {card.pairs} pairs, lost {lost}"
+    head = ("", "verdict", "mean, 95 % interval", "worst", "bound", "cells")
+    yield from aligned([head, *map(_finding_cells, card.findings)])
+    yield from (f"  {note}" for note in without_interval(card))
+    yield (
+        f"  converged: {card.baseline} {before}, {card.plant} {after}; alone {card.alone[0]} against {card.alone[1]}, "
+        f"McNemar p = {card.convergence_p:.3g}"
+    )
+
+
+def without_interval(card: Scorecard) -> Iterator[str]:
+    """Which parts have no interval, and why."""
+    measured_without = [f for f in card.findings if f.cells and f.effect.low is None and f.part.name != "reach"]
+    for why in dict.fromkeys(finding.effect.why for finding in measured_without):
+        titles = [finding.part.title for finding in measured_without if finding.effect.why == why]
+        yield f"no interval ({why}): {', '.join(titles)}"
+
+
+def _finding_cells(finding: Finding) -> tuple[str, ...]:
+    worst = finding.worst
+    if worst is None:
+        return finding.part.title, finding.verdict, "", "", "", ""
+    limits = bound(worst)
+    cells = f"{finding.passed}/{len(finding.cells)}"
+    return finding.part.title, verdict(finding), short(finding.effect), measured(worst.mean, finding), limits, cells
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Columns, two spaces apart and indented."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

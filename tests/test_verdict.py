@@ -1,0 +1,366 @@
+"""Pairs, scorecard and attribution: made-up flights whose answer is known, and real ones."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.metrics import MEANING
+from harness.verdict.assess import Assess
+from harness.verdict.attribution import attributions
+from harness.verdict.comparison import Comparison, compare
+from harness.verdict.pairs import CompareError, axes, entered, plant_pairs, spread
+from harness.verdict.scorecard import HOLDS, IF, NOT, UNSHOWN, Cell, conclusion
+from harness.verdict.words import answer, breaks_first, lines
+
+SEEDS = 12
+PLANTS = ("kinematic", "sixdof")
+QUIET = {
+    **dict.fromkeys(MEANING, 0.0), "convergence_time_s": 40.0, "heading_rate_gain": 1.0, "turn_ratio": 1.0,
+    "heading_rate_lag_s": 0.001,
+}  # fmt: skip
+
+
+def flight(plant: str, seed: int = 0, metrics: Mapping[str, float] = QUIET, **settings: object) -> dict[str, object]:
+    base = {
+        "plant": plant, "aircraft": "ultra_stick_25e", "seed": seed, "duration_s": 100.0, "guidance_period_s": 0.05,
+        "law.name": "smc", "law.gains": "paper", "law.k2": math.nan, "law.max_heading_rate_deg_s": 5.0,
+        "law.airspeed": "nominal", "start.airspeed_mps": 13.0, "start.heading_deg": 30.0 + seed,
+        "wind.steady_mps": (0.0, 0.0), "wind.turbulence": "none", "estimator.kind": "truth",
+        **settings,
+    }  # fmt: skip
+    key = "-".join(map(str, base.values()))
+    results = {"key": key, "outcome": "completed", "reason": "", "digest": key, "feasibility_margin_deg_s": 1.0}
+    return {**results, "seconds": 0.1, **base, **metrics}
+
+
+def table(rows: Iterator[dict[str, object]] | list[dict[str, object]]) -> pd.DataFrame:
+    return pd.DataFrame(list(rows))
+
+
+def over(**axis: list[object]) -> pd.DataFrame:
+    """All flights of a matrix, quiet on every plant; each metric moves a little with the seed alone."""
+    settings = {"plant": list(PLANTS), "seed": list(range(SEEDS)), **axis}
+    flights = []
+    for values in itertools.product(*settings.values()):
+        chosen = dict(zip(settings, values, strict=True))
+        flights.append(flight(**{key.replace("__", "."): value for key, value in chosen.items()}))
+    return table(flights)
+
+
+def moved(flights: pd.DataFrame, metric: str, by: float, scatter: float = 0.01, **where: object) -> pd.DataFrame:
+    """The metric of the 6-DOF flights that are set so moves by so much, more or less."""
+    flights = flights.copy()
+    chosen = flights["plant"] == "sixdof"
+    for key, value in where.items():
+        chosen &= flights[key.replace("__", ".")] == value
+    seeds = flights["seed"][chosen]
+    flights.loc[chosen, metric] += by + scatter * np.random.default_rng(3).normal(size=SEEDS)[seeds]
+    return flights
+
+
+# Pairs
+
+
+def test_flights_that_differ_in_the_plant_alone_are_pairs_whatever_their_order() -> None:
+    flights = over(guidance_period_s=[0.05, 0.5]).sample(frac=1.0, random_state=1)
+    paired = plant_pairs(flights, "kinematic")
+    assert len(paired) == 2 * SEEDS
+    assert not len(paired.unpaired)
+    for column in ("seed", "guidance_period_s", "start.heading_deg"):
+        assert list(paired.reference[column]) == list(paired.other[column])
+
+
+def test_a_flight_without_partner_and_a_failed_one_are_listed_with_what_they_are_set_to() -> None:
+    flights = over()
+    flights = flights.drop(index=flights.index[(flights["plant"] == "kinematic") & (flights["seed"] == 3)])
+    flights.loc[(flights["plant"] == "sixdof") & (flights["seed"] == 5), "outcome"] = "worker_died"
+    found = compare(flights, Assess())
+    assert len(found.pairs) == SEEDS - 2
+    assert sorted(left.settings["seed"] for left in found.unpaired) == [3, 5]
+    (failed,) = found.failed
+    assert (failed.outcome, failed.settings["seed"]) == ("worker_died", 5)
+    text = "\n".join(lines(found))
+    assert "2 flights have no partner:" in text
+    assert "1 flights failed and are in no pair:" in text
+
+
+@pytest.mark.parametrize(
+    ("flights", "told"),
+    [
+        (table([flight("sixdof")]), "1 flight in all: a comparison takes at least two"),
+        (table([flight("sixdof", 0), flight("sixdof", 1)]), "no flight has the baseline's plant, 'kinematic'"),
+        (table([flight("kinematic", 0), flight("kinematic", 1)]), "all 2 flights have plant 'kinematic'"),
+        (
+            table([flight("kinematic"), flight("sixdof", aircraft="skywalker_x8")]),
+            "differs from the nearest of 'kinematic' in aircraft too",
+        ),
+        (
+            table([flight("kinematic"), {**flight("sixdof"), "outcome": "timeout"}]),
+            "no flight of plant 'kinematic', or none of another, ended in a result",
+        ),
+    ],
+)
+def test_what_is_missing_for_a_comparison_is_said(flights: pd.DataFrame, told: str) -> None:
+    with pytest.raises(CompareError) as raised:
+        plant_pairs(flights, "kinematic")
+    assert told in str(raised.value)
+
+
+def test_a_lost_flight_enters_with_the_worst_and_an_unconverged_one_with_its_duration() -> None:
+    lost = {**QUIET, "convergence_time_s": 20.0, "range_error_rms_m": 3.0, "turn_ratio": 0.99}
+    rows = [
+        flight("kinematic", 0),
+        flight("sixdof", 0, {**QUIET, "convergence_time_s": math.nan, "range_error_rms_m": 50.0, "turn_ratio": 0.8}),
+        {**flight("sixdof", 1, lost), "outcome": "departed"},
+    ]
+    table_ = entered(table(rows))
+    assert list(table_["convergence_time_s"]) == [40.0, 100.0, 100.0]
+    assert list(table_["converged"]) == [True, False, False]
+    gone = table_.loc[2]
+    assert gone["range_error_rms_m"] == 50.0
+    assert gone["saturation_fraction"] == 1.0
+    assert gone["turn_ratio"] == 0.8
+
+
+def test_a_lost_flight_gets_no_metric_that_its_plant_does_not_have() -> None:
+    without = {**QUIET, "sideslip_rms_deg": math.nan}
+    rows = [
+        {**flight("kinematic", 0, without), "outcome": "target_lost"},
+        flight("sixdof", 0, {**QUIET, "sideslip_rms_deg": 9.0}),
+    ]
+    assert math.isnan(entered(table(rows))["sideslip_rms_deg"][0])
+
+
+def test_what_is_set_is_an_axis_and_what_is_drawn_or_follows_is_none() -> None:
+    flights = over(law__max_heading_rate_deg_s=[20.0, 5.0], law__gains=["paper", "paper_1"])
+    flights["law.alpha2"] = flights["law.gains"].map({"paper": 0.5, "paper_1": 2.0})
+    speed = flights["law.max_heading_rate_deg_s"].map({5.0: 0.0, 20.0: 4.0})
+    angle = np.radians(30.0 * flights["seed"])
+    flights["wind.steady_mps"] = list(zip(speed * np.cos(angle), speed * np.sin(angle), strict=True))
+    assert axes(spread(flights)) == {
+        "law": ["smc paper", "smc paper_1"],
+        "law.max_heading_rate_deg_s": [5.0, 20.0],
+    }  # the wind's speed follows the limit, its direction and the heading are drawn
+    severities = over(wind__turbulence=["severe", "none", "moderate"])
+    assert axes(severities) == {"wind.turbulence": ["none", "moderate", "severe"]}
+
+
+# The scorecard
+
+
+def cells(passing: Mapping[tuple[object, ...], bool], names: tuple[str, ...], beyond: bool = True) -> list[Cell]:
+    bounds = (None, 1.0)
+    return [
+        Cell(dict(zip(names, at, strict=True)), 5, 0.5 if ok or not beyond else 2.0, bounds, 0.01, 0, False, ok)
+        for at, ok in passing.items()
+    ]
+
+
+LIMITS: dict[str, list[object]] = {"limit": [5.0, 10.0, 20.0]}
+
+
+@pytest.mark.parametrize(
+    ("passing", "verdict", "condition"),
+    [
+        ([True, True, True], HOLDS, ""),
+        ([True, True, False], IF, "limit <= 10"),
+        ([True, False, False], IF, "limit <= 5"),
+        ([False, True, True], IF, "limit >= 10"),
+        ([False, True, False], IF, "limit = 10"),
+        ([True, False, True], IF, "limit <= 5"),
+        ([False, False, False], NOT, ""),
+    ],
+)
+def test_holds_if_is_the_largest_interval_in_which_every_cell_passes(
+    passing: list[bool], verdict: str, condition: str
+) -> None:
+    at = {(value,): ok for value, ok in zip(LIMITS["limit"], passing, strict=True)}
+    assert conclusion(cells(at, ("limit",)), LIMITS) == (verdict, condition)
+
+
+def test_an_inner_interval_has_two_ends() -> None:
+    across: dict[str, list[object]] = {"limit": [1.0, 2.0, 3.0, 4.0, 5.0]}
+    at = {(v,): v in (2.0, 3.0, 4.0) for v in across["limit"]}
+    assert conclusion(cells(at, ("limit",)), across) == (IF, "2 <= limit <= 4")
+
+
+def test_one_failing_cell_bars_a_value_and_the_axis_that_saves_most_cells_is_named() -> None:
+    across: dict[str, list[object]] = {**LIMITS, "law": ["a", "b"]}
+    at = {(limit, law): law == "a" or limit == 5.0 for limit in LIMITS["limit"] for law in ("a", "b")}
+    assert conclusion(cells(at, ("limit", "law")), across) == (IF, "law is a")
+    at[(10.0, "a")] = False
+    assert conclusion(cells(at, ("limit", "law")), across) == (IF, "limit <= 5")
+    at[(5.0, "b")] = False
+    assert conclusion(cells(at, ("limit", "law")), across) == (NOT, "")
+
+
+def test_severities_have_an_order_and_words_have_none() -> None:
+    across: dict[str, list[object]] = {"turbulence": ["none", "light", "moderate"]}
+    at = {("none",): True, ("light",): True, ("moderate",): False}
+    assert conclusion(cells(at, ("turbulence",)), across) == (IF, "turbulence <= light")
+    words: dict[str, list[object]] = {"law": ["a", "b", "c"]}
+    assert conclusion(cells({("a",): True, ("b",): False, ("c",): True}, ("law",)), words) == (IF, "law is a or c")
+
+
+def test_undecided_cells_alone_do_not_refute() -> None:
+    at = {(value,): False for value in LIMITS["limit"]}
+    assert conclusion(cells(at, ("limit",), beyond=False), LIMITS) == (UNSHOWN, "")
+
+
+def found(flights: pd.DataFrame) -> Comparison:
+    return compare(flights, Assess())
+
+
+def test_equal_plants_hold_in_every_part() -> None:
+    (card,) = found(over()).scorecards
+    assert {finding.verdict for finding in card.findings} == {HOLDS, "not measured"}  # SMC has no k2
+    assert breaks_first(card) is None
+
+
+def test_a_part_holds_if_the_limit_is_low_enough() -> None:
+    flights = over(law__max_heading_rate_deg_s=[5.0, 10.0, 20.0])
+    for limit, sideslip in ((5.0, 0.5), (10.0, 1.5), (20.0, 4.0)):
+        flights = moved(flights, "sideslip_rms_deg", sideslip, law__max_heading_rate_deg_s=limit)
+    (card,) = found(flights).scorecards
+    sideslip_found = card.finding("sideslip")
+    assert (sideslip_found.verdict, sideslip_found.condition) == (IF, "law.max_heading_rate_deg_s <= 10")
+    assert sideslip_found.effect.mean == pytest.approx(2.0, abs=0.05)
+    assert (sideslip_found.passed, sideslip_found.effect.pairs, sideslip_found.effect.seeds) == (2, 3 * SEEDS, SEEDS)
+    assert sideslip_found.worst is not None
+    assert sideslip_found.worst.at == {"law.max_heading_rate_deg_s": 20.0}
+    assert breaks_first(card) is sideslip_found
+    said = answer(found(flights))
+    assert len(said) == 3
+    assert "zero sideslip: within its bound in 2 of 3 cells, holds if law.max_heading_rate_deg_s <= 10" in said[1]
+
+
+def test_a_difference_within_the_margin_that_scatters_too_much_is_not_shown() -> None:
+    (card,) = found(moved(over(), "range_error_rms_m", 1.0, scatter=5.0)).scorecards
+    assert card.finding("settled_error").verdict == UNSHOWN
+    (card,) = found(moved(over(), "range_error_rms_m", 1.0, scatter=0.5)).scorecards
+    assert card.finding("settled_error").verdict == HOLDS
+
+
+def test_holm_makes_a_lonely_test_harder_in_company() -> None:
+    """Ten cells of one part, and ten of another that are less clear: the same p-value counts twenty times."""
+    few = moved(over(), "range_error_rms_m", 1.5, scatter=0.5)
+    (card,) = found(few).scorecards
+    alone = card.finding("settled_error").cells[0].p
+    many = over(guidance_period_s=[0.05 + 0.05 * i for i in range(10)])
+    many = moved(moved(many, "range_error_rms_m", 1.5, scatter=0.5), "sideslip_rms_deg", 1.9, scatter=0.4)
+    (card,) = found(many).scorecards
+    company = card.finding("settled_error").cells[0].p
+    assert alone is not None
+    assert company is not None
+    assert 0.001 < alone < 0.05
+    assert company == pytest.approx(20 * alone)
+
+
+def test_lost_flights_count_against_every_part_of_their_cell() -> None:
+    flights = over(wind__turbulence=["none", "severe"])
+    lost = (flights["plant"] == "sixdof") & (flights["wind.turbulence"] == "severe") & (flights["seed"] < 3)
+    flights.loc[lost, "outcome"] = "departed"
+    (card,) = found(flights).scorecards
+    assert card.lost.number == 3
+    assert (card.finding("alive").verdict, card.finding("alive").condition) == (IF, "wind.turbulence <= none")
+    for finding in card.findings:
+        if finding.cells and finding.part.name != "reach":  # that one is about settings
+            assert (finding.verdict, finding.condition) == (IF, "wind.turbulence <= none"), finding.part.name
+    assert card.finding("convergence_time").effect.pairs == 2 * SEEDS
+
+
+def test_convergence_is_compared_by_who_converges_alone() -> None:
+    flights = over()
+    never = (flights["plant"] == "sixdof") & (flights["seed"] < 6)
+    flights.loc[never, "convergence_time_s"] = np.nan
+    (card,) = found(flights).scorecards
+    assert card.alone == (6, 0)
+    assert card.convergence_p == pytest.approx(2 * 0.5**6)
+    assert card.finding("convergence").verdict == NOT
+    assert card.finding("convergence_time").effect.mean == pytest.approx(0.5 * 60.0)  # censored at 100 s
+
+
+def test_where_neither_converges_the_time_says_nothing() -> None:
+    flights = over()
+    flights.loc[flights["seed"] < 6, "convergence_time_s"] = np.nan
+    (card,) = found(flights).scorecards
+    assert card.finding("convergence_time").effect.pairs == SEEDS - 6
+    assert card.finding("convergence").verdict == HOLDS
+
+
+def test_one_flight_each_is_one_difference_without_interval() -> None:
+    flights = over()
+    flights = moved(flights[flights["seed"] == 0], "sideslip_rms_deg", 1.0, scatter=0.0)
+    (card,) = found(flights).scorecards
+    sideslip = card.finding("sideslip")
+    assert sideslip.effect.mean == pytest.approx(1.0)
+    assert sideslip.effect.low is None
+    assert "one seed" in sideslip.effect.why
+    assert sideslip.verdict == HOLDS
+    assert "no interval (one seed: nothing was drawn): " in "\n".join(lines(found(flights)))
+
+
+def test_the_bank_limit_is_the_airframes() -> None:
+    """At 33 deg/s and 13 m/s the relation asks for 37.4 deg; the Ultra Stick's inner loop stops at 46."""
+    flights = over(law__max_heading_rate_deg_s=[5.0, 33.0, 50.0])
+    (card,) = found(flights).scorecards
+    reach = card.finding("reach")
+    needed = [math.degrees(math.atan(13.0 * math.radians(limit) / 9.80665)) for limit in (5.0, 33.0, 50.0)]
+    limit = math.degrees(0.8)
+    assert [cell.mean for cell in reach.cells] == pytest.approx([n - limit for n in needed], abs=0.1)
+    assert (reach.verdict, reach.condition) == (IF, "law.max_heading_rate_deg_s <= 33")
+
+
+# Attribution
+
+
+def ladder() -> pd.DataFrame:
+    """Rungs that add 1, 2 and 3 to a metric, wind that adds 10, turbulence 4 and 9."""
+    rungs = ("kinematic", "lagged", "coordinated", "sixdof")
+    rows = []
+    for i, seed, wind, turbulence in itertools.product(range(4), range(6), (0.0, 5.0), ("none", "light", "moderate")):
+        value = (i * (i + 1)) / 2 + 0.1 * seed + 2.0 * wind + {"none": 0.0, "light": 4.0, "moderate": 9.0}[turbulence]
+        metrics = {**QUIET, "range_error_rms_m": value}
+        rows.append(flight(rungs[i], seed, metrics, **{"wind.steady_mps": (wind, 0.0), "wind.turbulence": turbulence}))
+    return table(rows)
+
+
+def test_the_rungs_add_up_from_the_first_plant_to_the_last() -> None:
+    (one,) = attributions(entered(ladder()))
+    assert one.rungs == ("kinematic", "lagged", "coordinated", "sixdof")
+    assert one.scenarios == 6 * 2 * 3
+    error = next(ladder for ladder in one.ladders if ladder.metric == "range_error_rms_m")
+    assert [step.effect.mean for step in error.steps] == pytest.approx([1.0, 2.0, 3.0])
+    for whole in one.ladders:
+        assert whole.start + sum(step.effect.mean for step in whole.steps) == pytest.approx(whole.end)
+
+
+def test_a_scenario_missing_on_one_rung_is_left_out_on_all() -> None:
+    flights = ladder()
+    gone = (flights["plant"] == "lagged") & (flights["seed"] == 2)
+    (one,) = attributions(entered(flights[~gone]))
+    assert one.scenarios == 5 * 2 * 3
+    error = next(ladder for ladder in one.ladders if ladder.metric == "range_error_rms_m")
+    assert error.start + sum(step.effect.mean for step in error.steps) == pytest.approx(error.end)
+
+
+def test_a_rung_that_was_not_flown_is_part_of_the_step_above() -> None:
+    flights = ladder()
+    (one,) = attributions(entered(flights[flights["plant"].isin(["kinematic", "coordinated"])]))
+    (step,) = one.ladders[0].steps
+    assert step.what == "lag of the heading rate, bank and airspeed dynamics"
+
+
+def test_each_disturbance_adds_what_it_adds_to_the_same_flight_without_it() -> None:
+    (one,) = attributions(entered(ladder()))
+    added = {
+        (step.what, step.plant): step.effect.mean for step in one.disturbances if step.metric == "range_error_rms_m"
+    }
+    for plant in ("kinematic", "sixdof"):
+        assert added["wind 5 m/s", plant] == pytest.approx(10.0)
+        assert added["turbulence light", plant] == pytest.approx(4.0)
+        assert added["turbulence moderate", plant] == pytest.approx(9.0)
