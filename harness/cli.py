@@ -5,11 +5,13 @@ import sys
 import click
 
 from harness.commands.check import check
+from harness.commands.compare import compare
 from harness.commands.demo import demo
 from harness.commands.doctor import doctor
 from harness.commands.fly import fly
 from harness.commands.identify import identify
 from harness.commands.list import list_
+from harness.commands.report import report
 from harness.commands.reproduce import reproduce
 from harness.commands.run import run
 from harness.commands.show import show
@@ -26,7 +28,7 @@ def harness() -> None:
     """
 
 
-for command in (fly, run, show, check, list_, demo, reproduce, identify, doctor):
+for command in (fly, run, show, compare, report, check, list_, demo, reproduce, identify, doctor):
     harness.add_command(command)
 
 

@@ -205,7 +205,9 @@ def test_help_needs_none_of_the_heavy_libraries() -> None:
     assert "Example" in done.stdout
 
 
-@pytest.mark.parametrize("command", ["fly", "run", "show", "check", "list", "demo", "reproduce", "doctor"])
+@pytest.mark.parametrize(
+    "command", ["fly", "run", "show", "compare", "report", "check", "list", "demo", "reproduce", "doctor"]
+)
 def test_every_command_shows_an_example(command: str) -> None:
     assert "Example" in harness(command, "--help").stdout
 

@@ -235,6 +235,16 @@ def find(folder: Path, beginning: str) -> Stored:
     return Stored(row, json.loads(kept["final"]), kept["seconds"], json.loads(kept["decides"]), run)
 
 
+def last_run(folder: Path) -> Mapping[str, Any]:
+    """The provenance of the latest run in this directory, and when it ended. Raises `StoreError`."""
+    with reading(folder) as journal:
+        journal.row_factory = sqlite3.Row
+        found = journal.execute("SELECT * FROM runs ORDER BY id DESC LIMIT 1").fetchone()
+    if found is None:
+        raise StoreError(f"{folder}: no run has begun here")
+    return dict(found)
+
+
 def content(folder: Path, digest: str) -> bytes:
     """A file that a flight read, by its hash. Raises `StoreError`."""
     with reading(folder) as journal:

@@ -150,7 +150,7 @@ def _step(metric: str, what: str, plant: str, paired: Pairs) -> Step:
     change = paired.other[metric].to_numpy(float) - paired.reference[metric].to_numpy(float)
     there = ~np.isnan(change)
     seeds = paired.other["seed"].to_numpy()[there]
-    return Step(metric, what, plant, effect(change[there], seeds, f"{metric} {what} {plant}"))
+    return Step(metric, what, plant, effect(change[there], seeds, metric))
 
 
 def _disturbed(flights: pd.DataFrame, disturbance: Disturbance, rungs: Sequence[str]) -> Iterator[Step]:

@@ -102,7 +102,7 @@ def _rows(paired: Pairs) -> Iterator[Row]:
             change = other - reference
             there = ~np.isnan(change)
             seeds = those.other["seed"].to_numpy()[there]
-            found = effect(change[there], seeds, f"{aircraft} {label} {plant} {metric}")
+            found = effect(change[there], seeds, metric)
             yield Row(str(aircraft), str(label), str(plant), metric, _mean(reference), _mean(other), found)
 
 

@@ -124,8 +124,8 @@ def _limit(table: pd.DataFrame) -> pd.Series:
 
 
 def _bank_limit_deg(name: str) -> float:
-    """NaN for an airframe that is not here any more."""
+    """NaN for an airframe that is not here any more, or is broken."""
     try:
-        return math.degrees(aircraft.bank_limit(aircraft.folder(name)))
-    except OSError:
+        return math.degrees(aircraft.limits(aircraft.folder(name)).bank)
+    except (OSError, ValueError):
         return math.nan

@@ -164,7 +164,7 @@ def differences(part: Part, pairs: Pairs) -> tuple[NDArray[np.float64], NDArray[
 
 def _effect(part: Part, pairs: Pairs) -> Effect:
     values, says = differences(part, pairs)
-    return effect(values[says], pairs.other["seed"].to_numpy()[says], part.name)
+    return effect(values[says], pairs.other["seed"].to_numpy()[says], part.column)
 
 
 def _cells(part: Part, pairs: Pairs, groups: Groups, assess: Assess) -> Iterator[Cell]:

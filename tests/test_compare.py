@@ -1,0 +1,262 @@
+"""`harness compare` and `harness report` on directories that `harness run` made."""
+
+import csv
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import aircraft
+from harness.cli import harness as command_line
+
+EXPERIMENT = """\
+title = "Two limits"
+question = "Does it hold at 5 and at 20 deg/s?"
+[flight]
+plant = "sixdof"
+duration_s = 40.0
+law = { name = "nftsm", gains = "paper_1" }
+[matrix]
+plant = ["kinematic", "sixdof"]
+"law.max_heading_rate_deg_s" = [5.0, 20.0]
+"start.heading_deg" = { uniform = [20.0, 60.0] }
+seed = { start = 0, count = 5 }
+[assess]
+sideslip_deg = 1.0
+"""
+
+
+def harness(*words: object) -> Result:
+    """The command line in this process: a new one would import pandas and SciPy each time."""
+    return CliRunner().invoke(command_line, [str(word) for word in words])
+
+
+def run(folder: Path, text: str, *words: object) -> Path:
+    """Flies the experiment into a directory beside it, by the command itself: its line is kept with the results."""
+    file, out = folder / "experiment.toml", folder / "out"
+    file.write_text(text, encoding="utf-8")
+    command = ["-m", "harness", "run", file, "--out", out, "--workers", 0, "--log", "none", *words]
+    done = subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run(tmp_path_factory.mktemp("run"), EXPERIMENT, "--set", "assess.range_error_margin_m=3.0")
+
+
+@pytest.fixture(scope="module")
+def page(flown: Path) -> Path:
+    done = harness("report", flown)
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout == f"{flown / 'report.html'}\n"
+    return flown / "report.html"
+
+
+def compared(flown: Path, *words: object) -> dict[str, Any]:
+    done = harness("compare", flown, "--json", *words)
+    assert done.exit_code == 0, done.stderr
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+def finding(answer: dict[str, Any], part: str) -> dict[str, Any]:
+    (card,) = answer["scorecards"]
+    return next(one for one in card["findings"] if one["part"]["name"] == part)
+
+
+def test_real_flights_are_paired_and_told_with_their_intervals(flown: Path) -> None:
+    done = harness("compare", flown)
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.startswith("10 pairs of sixdof beside kinematic, 5 seeds, from 20 flights\n")
+    line = next(line for line in done.stdout.splitlines() if "convergence_time_s" in line)
+    assert re.search(r"\+\d+(\.\d+)? to \+\d+(\.\d+)? +10$", line), line
+    said = done.stdout.splitlines()[-3:]
+    assert [sentence.split("?")[0] for sentence in said] == ["Does it hold", "What breaks first", "What does it cost"]
+
+
+def test_json_holds_pairs_differences_scorecards_and_the_margins_of_the_run(flown: Path) -> None:
+    answer = compared(flown)
+    assert len(answer["pairs"]) == 10
+    assert answer["unpaired"] == answer["failed"] == []
+    assert answer["assess"]["sideslip_deg"] == 1.0  # from the file
+    assert answer["assess"]["range_error_margin_m"] == 3.0  # from the run's command line
+    assert answer["axes"] == {"law.max_heading_rate_deg_s": [5.0, 20.0]}
+    (activity,) = [row for row in answer["differences"] if row["metric"] == "command_activity_deg_s2"]
+    change = activity["difference"]
+    assert activity["other"] - activity["reference"] == pytest.approx(change["mean"])
+    assert 0 < change["low"] < change["mean"] < change["high"]
+    assert finding(answer, "activity")["verdict"] == "does not hold"
+    assert finding(answer, "level")["verdict"] == "holds"
+    assert finding(answer, "activity")["effect"]["mean"] == pytest.approx(change["mean"])
+
+
+def test_the_table_and_the_scorecard_say_the_same_of_the_same_pairs(flown: Path) -> None:
+    answer = compared(flown)
+    (row,) = [row for row in answer["differences"] if row["metric"] == "saturation_fraction"]
+    assert finding(answer, "saturation")["effect"] == row["difference"]
+
+
+def test_a_margin_on_the_command_line_changes_the_verdict(flown: Path) -> None:
+    assert finding(compared(flown), "lag")["verdict"] == "holds"
+    assert finding(compared(flown, "--set", "assess.heading_rate_lag_s=0.01"), "lag")["verdict"] == "does not hold"
+
+
+def test_csv_and_latex_hold_every_difference(flown: Path) -> None:
+    rows = list(csv.DictReader(io.StringIO(harness("compare", flown, "--csv").stdout)))
+    differences = compared(flown)["differences"]
+    assert [row["metric"] for row in rows] == [one["metric"] for one in differences]
+    for row, one in zip(rows, differences, strict=True):
+        assert row["difference"] == ("" if one["difference"]["mean"] is None else repr(one["difference"]["mean"]))
+    latex = harness("compare", flown, "--latex").stdout
+    assert latex.count(r"\\") == len(rows) + 2
+    assert latex.count("{") == latex.count("}")
+    assert not re.search(r"(?<!\\)_", latex)
+
+
+def test_the_same_flights_give_the_same_words_and_the_same_page(flown: Path, page: Path, tmp_path: Path) -> None:
+    assert harness("compare", flown, "--json").stdout == harness("compare", flown, "--json").stdout
+    again = tmp_path / "again.html"
+    assert harness("report", flown, "--out", again).exit_code == 0
+    assert again.read_bytes() == page.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--baseline", "lagged"], "no flight has the baseline's plant, 'lagged': there is kinematic, sixdof"),
+        (["--set", "law.name=smc"], "--set law.name=smc: only margins can be set here, as in assess.sideslip_deg=3"),
+        (["--set", "assess.sideslip=1"], "did you mean 'sideslip_deg'?"),
+        (["--set", "assess.sideslip_deg=-1"], "assess.sideslip_deg: is -1, must be a number > 0"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line_and_exit_code_2(flown: Path, words: list[str], told: str) -> None:
+    for command in ("compare", "report"):
+        done = harness(command, flown, *words)
+        assert done.exit_code == 2
+        (line,) = done.stderr.splitlines()
+        assert told in line
+
+
+def test_no_run_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "nothing"):
+        for command in ("compare", "report"):
+            done = harness(command, folder)
+            assert done.exit_code == 2
+            (line,) = done.stderr.splitlines()
+            assert line.startswith(f"{folder}: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_flight_has_nothing_to_be_compared_with(tmp_path: Path) -> None:
+    done = harness("compare", run(tmp_path, EXPERIMENT, "--limit", 1))
+    assert done.exit_code == 2
+    assert done.stderr.endswith("a comparison takes at least two, of kinematic and another plant\n")
+
+
+def test_flights_of_two_inner_loops_are_not_compared(tmp_path: Path) -> None:
+    airframe = tmp_path / "stick"
+    shutil.copytree(aircraft.folder("ultra_stick_25e"), airframe)
+    (airframe / "ultra_stick_25e.xml").rename(airframe / "stick.xml")
+    text = EXPERIMENT.replace('plant = "sixdof"\n', f'plant = "sixdof"\naircraft = "{airframe}"\n', 1)
+    text = text.replace("count = 5", "count = 1").replace("[5.0, 20.0]", "[5.0]").replace("40.0", "10.0", 1)
+    assert harness("compare", run(tmp_path, text)).exit_code == 0
+    model = airframe / "stick.xml"
+    model.write_text(model.read_text(encoding="utf-8").replace("</fdm_config>", "<!-- edited -->\n</fdm_config>"))
+    done = harness("compare", run(tmp_path, text))
+    assert done.exit_code == 2
+    assert "of different versions, which a comparison must not mix: aircraft/model of" in done.stderr
+
+
+# The page
+
+
+def test_the_page_is_one_small_file(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert len(text.encode()) < 3_000_000
+    fetched = re.findall(r"(?:src|href)\s*=\s*[\"']?(?!#)([^\"'> ]+)|url\((?!#)([^)]+)\)|@import", text)
+    assert fetched == []
+
+
+def chromium() -> str:
+    """Where Chromium is; without it the test is skipped, but for CI, where it has to be."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if found := shutil.which(name):
+            return found
+    if os.environ.get("CI"):
+        pytest.fail("no Chromium to open the page with")
+    pytest.skip("no Chromium to open the page with")
+
+
+def opened(page: Path, profile: Path) -> subprocess.CompletedProcess[str]:
+    """The page in the browser: what it shows on stdout, what its console says on stderr."""
+    return subprocess.run(
+        [
+            chromium(), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", "--no-first-run",
+            "--disable-background-networking", "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom",
+            page.as_uri(),
+        ],
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+
+
+def test_a_browser_shows_all_of_the_page(page: Path, tmp_path: Path) -> None:
+    done = opened(page, tmp_path)
+    dom = done.stdout
+    shown = re.findall(r'<section[^>]* id="(\w+)"', dom)
+    assert shown == ["answer", "scorecard", "differences", "distributions", "attribution", "flights", "margins"]
+    assert dom.count("<svg") == 2  # distributions, and one waterfall of one airframe and law
+    assert dom.count("harness view") >= 3
+    for sentence in ("Does it hold?", "What breaks first?", "What does it cost?"):
+        assert sentence in dom
+    assert "CONSOLE" not in done.stderr  # where the browser says what the page's policy forbids
+
+
+def test_a_browser_fetches_nothing_for_the_page(page: Path, tmp_path: Path) -> None:
+    """Without the page's own policy, which would hide an attempt; the same page with a picture shows that we look."""
+    asks = (
+        "<script>addEventListener('load', () => document.title = "
+        "performance.getEntriesByType('resource').map(e => e.name).join(' '))</script>"
+    )
+    picture = "http://127.0.0.1:9/picture.png"  # nothing answers there
+    bare = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', asks, page.read_text(encoding="utf-8"))
+    assert asks in bare
+    fetched = []
+    for i, text in enumerate((bare, bare.replace("</body>", f'<img src="{picture}"></body>'))):
+        copy = tmp_path / f"copy-{i}.html"
+        copy.write_text(text, encoding="utf-8")
+        title = re.search(r"<title>([^<]*)</title>", opened(copy, tmp_path / "profile").stdout)
+        assert title
+        fetched.append(title[1].split())
+    assert fetched == [[], [picture]]
+
+
+def test_markdown_says_the_same_and_how_it_was_made(flown: Path, tmp_path: Path) -> None:
+    path = tmp_path / "results.md"
+    assert harness("report", flown, "--markdown", path).exit_code == 0
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("# Two limits\n\nDoes it hold at 5 and at 20 deg/s?\n\n10 pairs of sixdof beside kinematic")
+    for sentence in compared(flown)["answer"]:
+        assert sentence in text
+    for heading in ("## The answer", "## Scorecards", "## What breaks first, and where", "## Attribution"):
+        assert heading in text
+    assert "harness run" in text
+    assert f"harness report {flown} --markdown docs/results.md" in text
+    widths = [[line.count("|") for line in block.splitlines()] for block in text.split("\n\n") if block.startswith("|")]
+    assert widths
+    assert all(len(set(counts)) == 1 for counts in widths)  # every row of a table has all its cells
+
+
+def test_two_places_for_one_page_are_refused(flown: Path, tmp_path: Path) -> None:
+    done = harness("report", flown, "--out", tmp_path / "a.html", "--markdown", tmp_path / "b.md")
+    assert done.exit_code == 2
+    assert list(tmp_path.iterdir()) == []
