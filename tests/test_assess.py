@@ -1,6 +1,7 @@
 """The margins of the verdict as a file sets them."""
 
 import math
+import re
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, get_args, get_origin, get_type_hints
@@ -9,6 +10,7 @@ import pytest
 
 from autopilot.quantities import About
 from harness.settings import SettingsError, load_flight, read_settings, settings_from_text
+from harness.settings.written import written
 from harness.verdict.assess import Assess
 
 FILE = """\
@@ -68,3 +70,14 @@ def test_every_margin_says_what_it_means_and_where_it_comes_from() -> None:
         assert get_origin(hint) is Annotated
         (about,) = [mark.text for mark in get_args(hint) if isinstance(mark, About)]
         assert any(source in about for source in ("Ours:", "Part 60", "ACS", "Delay", "Table 1", "Holm")), field.name
+
+
+def test_the_document_has_every_margin_with_its_default() -> None:
+    text = (Path(__file__).parent.parent / "docs" / "verdict.md").read_text(encoding="utf-8")
+    rows = {row.split("|")[3].strip(" `"): row.split("|")[4] for row in text.splitlines() if row.count("|") == 6}
+    for key, default in written(Assess()).items():
+        assert key in rows, key
+        number = re.search(r"1/e|[\d.]+", rows[key])
+        assert number, key
+        told = 1.0 / math.e if number[0] == "1/e" else float(number[0])
+        assert told / (100.0 if "%" in rows[key] else 1.0) == pytest.approx(default), key

@@ -45,7 +45,7 @@ class Assess:
         float, Ge(0), Lt(1), About("of the shares that converge. Ours: as for lost flights")
     ] = 0.05
     convergence_time_margin: Annotated[
-        float, Gt(0), About("relative to the baseline's mean. Part 60: 10 %, its widest tolerance of a response")
+        float, Gt(0), About("relative to the baseline's mean. Part 60: 10 %, as of a yaw rate")
     ] = 0.10
     range_error_margin: Annotated[
         Metres, Gt(0), About("rms over the last half. Ours: 1 % of the standoff distance")
