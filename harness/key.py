@@ -14,6 +14,7 @@ from harness.flight import IDENTIFIED_PLANTS, Flight
 from harness.settings import document
 
 PHYSICS = 1  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
+METRICS = 1  # of what a log is judged by: raised whenever a change there moves a metric
 
 
 class Identity(NamedTuple):
@@ -39,6 +40,7 @@ def version_of(flight: Flight) -> dict[str, Any]:
     """All that decides the flight beside its settings, as it is now."""
     return {
         "physics": PHYSICS,
+        "metrics": METRICS,
         "content": {name: _digest(path, path.stat().st_mtime_ns) for name, path in files(flight).items()},
         "jsbsim": _installed("jsbsim") if flight.plant == "sixdof" else None,
         "filterpy": _installed("filterpy") if flight.estimator.kind == "ekf" else None,
@@ -46,7 +48,7 @@ def version_of(flight: Flight) -> dict[str, Any]:
 
 
 def flight_key(flight: Flight) -> str:
-    """32 hex digits, equal exactly when the same flight would be flown."""
+    """32 hex digits, equal exactly when the same flight would be flown, and judged alike."""
     return identity(flight).key
 
 

@@ -87,34 +87,51 @@ def _overshoot(error: Array) -> float | None:
 
 
 def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | None, float | None]:
-    """The delay of largest correlation, to a fraction of a period, and the ratio there by least squares."""
-    if len(command) < 2 or np.std(command) < LEAST_EXCITATION:
-        return None, None
+    """The delay at which the command explains most of the flown rate's variation, and the ratio there.
+
+    Both by least squares, and exact for a pure delay: over a period, a held command delayed by a share of a period is
+    a mix of two neighbours.
+    """
     longest = min(round(LONGEST_LAG / period), len(command) // 2)
-    likeness = _likeness(command, flown, longest)
-    n = int(np.argmax(likeness))
-    lag = n + (_vertex(likeness[n - 1 : n + 2]) if 0 < n < longest else 0.0)
-    u, y = command[: len(command) - n], flown[n:]
-    return float(lag * period), float(u @ y / (u @ u))
+    if longest < 1 or np.std(command) < LEAST_EXCITATION:
+        return None, None
+    y = flown[longest:]  # what was commanded before the flight is not known
+    explained, share = _mixes(command, y, longest)
+    n = int(np.argmax(explained))
+    u, later = (command[longest - k : len(command) - k] for k in (n, n + 1))
+    mixed = (1.0 - share[n]) * u + share[n] * later
+    return float((n + share[n]) * period), float(mixed @ y) / max(float(mixed @ mixed), 1e-300)
 
 
-def _likeness(a: Array, b: Array, longest: int) -> Array:
-    """The correlation of a with b delayed by 0 to `longest` samples, over the samples that both then have."""
-    a, b = a - a.mean(), b - b.mean()  # so that the running sums lose no digits
-    n = np.arange(longest + 1)
-    size = len(a) - n
-    products = np.array([a[: len(a) - k] @ b[k:] for k in n])
-    sum_a, sum_aa = (np.cumsum(x)[size - 1] for x in (a, a * a))
-    sum_b, sum_bb = (np.cumsum(x[::-1])[size - 1] for x in (b, b * b))
-    spread = (sum_aa - sum_a * sum_a / size) * (sum_bb - sum_b * sum_b / size)
-    varied = spread > 1e-20 * (a @ a) * (b @ b)  # else what is left is rounding
-    return np.where(varied, (products - sum_a * sum_b / size) / np.sqrt(np.where(varied, spread, 1.0)), 0.0)
+def _mixes(command: Array, y: Array, longest: int) -> tuple[Array, Array]:
+    """What of y the command, late by n samples, explains when mixed best with the next delay; the share of the next.
+
+    n is below `longest`.
+
+    Sums of squares about the means; neither is taken negatively.
+    """
+    c, size = command - command.mean(), len(y)  # so that the running sums lose no digits
+    y = y - y.mean()
+    begin = longest - np.arange(longest + 1)  # of each window
+    total = _sums(c, begin, size)
+    square = np.maximum(_sums(c * c, begin, size) - total * total / size, 1e-20 * (c @ c))  # less is rounding
+    uu, ll = square[:-1], square[1:]
+    ul = _sums(c[1:] * c[:-1], begin[1:], size) - total[:-1] * total[1:] / size
+    uy = np.array([c[k : k + size] @ y for k in begin])
+    uy, ly = uy[:-1], uy[1:]
+    det = uu * ll - ul * ul
+    both = det > 1e-12 * uu * ll
+    a, b = ((v / np.where(both, det, 1.0)) for v in (uy * ll - ly * ul, ly * uu - uy * ul))
+    both &= (a >= 0.0) & (b >= 0.0) & (a + b > 0.0)
+    first, second = (np.maximum(v, 0.0) ** 2 / w for v, w in ((uy, uu), (ly, ll)))  # of one alone
+    explained = np.where(both, a * uy + b * ly, np.maximum(first, second))
+    return explained, np.where(both, b / np.where(both, a + b, 1.0), second > first)
 
 
-def _vertex(y: Array) -> float:
-    """Where the parabola through three neighbours has its top, from the middle one."""
-    bend = y[0] - 2.0 * y[1] + y[2]
-    return float(0.5 * (y[0] - y[2]) / bend) if bend else 0.0
+def _sums(x: Array, begin: NDArray[np.intp], size: int) -> Array:
+    """The sum of x over each window."""
+    running: Array = np.concatenate([[0.0], np.cumsum(x)])
+    return running[begin + size] - running[begin]
 
 
 def _turn_ratio(log: FlightLog) -> float | None:

@@ -10,6 +10,7 @@ import pytest
 from autopilot.laws import law
 from harness.air import Air
 from harness.flight import Flight, feasibility_margin, needed_rate, problems, warnings
+from harness.key import flight_key
 from harness.plant import Start
 from harness.plants.kinematic import Kinematic
 from harness.simulation import simulate
@@ -112,6 +113,13 @@ def test_more_heading_rate_than_the_bank_limit_gives_is_a_warning() -> None:
 def test_an_airspeed_outside_the_envelope_is_a_warning() -> None:
     slow = replace(FLIGHT, plant="sixdof", aircraft="aerosonde")
     assert ["18 to 35 m/s" in text for text in warnings(slow)] == [True]
+
+
+@pytest.mark.parametrize("changed", ["PHYSICS", "METRICS"])
+def test_other_physics_or_metrics_give_another_key(monkeypatch: pytest.MonkeyPatch, changed: str) -> None:
+    before = flight_key(FLIGHT)
+    monkeypatch.setattr(f"harness.key.{changed}", 0)
+    assert flight_key(FLIGHT) != before
 
 
 def test_a_kinematic_start_needs_no_height() -> None:

@@ -78,6 +78,17 @@ def test_lag_and_gain_of_a_delayed_turn_are_found(lag: float, gain: float) -> No
     assert judged["heading_rate_gain"] == pytest.approx(gain, rel=0.01)
 
 
+@pytest.mark.parametrize("lag", [0.013, 0.2, 0.425, 1.99])
+def test_lag_and_gain_of_a_held_command_with_a_pure_delay_are_exact(lag: float) -> None:
+    """The heading is the integral of 0.9 times the held command, delayed: the mean rate is a mix of two periods."""
+    command = 0.08 * np.random.default_rng(0).choice([-1.0, 1.0], len(TIME)) + 0.03
+    turned = np.concatenate([[0.0], 0.05 * 0.9 * np.cumsum(command)])
+    heading = np.interp(TIME - lag, np.arange(len(turned)) * 0.05, turned)
+    judged = metrics(log_of(heading_rate_command=command, unlimited_command=command, heading=heading))
+    assert judged["heading_rate_lag_s"] == pytest.approx(lag, abs=1e-9)
+    assert judged["heading_rate_gain"] == pytest.approx(0.9, abs=1e-9)
+
+
 def test_a_constant_command_tells_nothing_of_lag() -> None:
     judged = metrics(log_of(heading_rate_command=0.05, unlimited_command=0.05, heading=0.05 * TIME))
     assert judged["heading_rate_lag_s"] is None
