@@ -1,6 +1,7 @@
 """The air of one flight: a steady wind, and what it does beyond that, the same for whatever flies in it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +13,10 @@ Vector = tuple[float, float, float]
 
 def _calm() -> Array:
     return np.empty((0, 3))
+
+
+def _at_rest(span: float) -> Array:
+    return np.empty((0, 4))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,6 +31,11 @@ class Air:
     altitude: float = 0.0  # m: where the wind is the steady one
     step: float = math.inf  # s: of the grid
     gusts: Array = field(default_factory=_calm)  # (steps + 1, 3), beyond the steady wind
+    rotation: Callable[[float], Array] = _at_rest
+    """The air's rotation over a wing of this span (m), rad/s: (steps + 1, 4), or no row where it does not rotate.
+
+    Roll rate, pitch rate, and two parts of the yaw rate, which is east cos(yaw) - north sin(yaw): north, east.
+    """
     _way: Array = field(init=False)  # (steps + 1, 2): how far they have carried since the start, north, east
 
     def __post_init__(self) -> None:
@@ -40,6 +50,11 @@ class Air:
             return 0.0, 0.0, 0.0
         north, east, down = self.gusts[k].tolist()
         return north, east, down
+
+    def horizontal(self, k: int) -> tuple[float, float]:
+        """The whole horizontal wind at the k-th step, at `altitude`; north, east."""
+        (W_x, W_y), (gust_x, gust_y, _) = self.steady, self.gust(k)
+        return W_x + gust_x, W_y + gust_y
 
     def drift(self, begin: int, end: int) -> tuple[float, float]:
         """How far, m, the gusts carry something that follows them at once, between two steps; north, east."""

@@ -18,7 +18,7 @@ from harness.plant import Plant, Start
 from harness.plants.kinematic import Kinematic
 from harness.target import Target, TargetState
 from harness.track import TrackError, load_track
-from harness.wind import Wind
+from harness.wind import HIGHEST, LOWEST, Wind
 
 IDENTIFIED_PLANTS = ("lagged", "coordinated")  # they fly by what `harness identify` left beside the airframe
 MOST_PERIODS = 4_000_000  # of a flight: its log takes 2 GB
@@ -97,7 +97,13 @@ def try_start(flight: Flight) -> None:
 
 def air_of(flight: Flight) -> Air:
     """The air that the flight meets: the same for every plant, law and guidance period."""
-    return flight.wind.start(flight.start.altitude, flight.step, flight.duration)
+    return flight.wind.start(
+        airspeed=flight.start.airspeed,
+        altitude=flight.start.altitude,
+        step=flight.step,
+        duration=flight.duration,
+        seed=flight.seed,
+    )
 
 
 def problems(flight: Flight) -> list[Problem]:
@@ -134,6 +140,10 @@ def problems(flight: Flight) -> list[Problem]:
         for i, gust in enumerate(flight.wind.gusts)
         if gust.to <= gust.from_
     ]
+    altitude = flight.start.altitude
+    if flight.wind.turbulence != "none" and not LOWEST <= altitude <= HIGHEST:
+        holds = f"the low-altitude model holds from {LOWEST:g} to {HIGHEST:g} m; the flight starts at {altitude:g} m"
+        found.append(Problem("wind.turbulence", holds))
     found += _target_problems(flight)
     found += _aircraft_problems(flight)
     return found

@@ -43,6 +43,7 @@ def version_of(flight: Flight) -> dict[str, Any]:
         "metrics": METRICS,
         "content": {name: _digest(path, path.stat().st_mtime_ns) for name, path in files(flight).items()},
         "jsbsim": _installed("jsbsim") if flight.plant == "sixdof" else None,
+        "turbulence": [_installed("numpy"), _installed("scipy")] if flight.wind.turbulence != "none" else None,
         "filterpy": _installed("filterpy") if flight.estimator.kind == "ekf" else None,
     }
 

@@ -1,6 +1,7 @@
 """The wind of a flight as it is set."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,6 +11,9 @@ from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre
 from harness.air import Air, Array
 
 _Gusty = Annotated[MetresPerSecond, Ge(-100), Le(100)]
+
+
+LOWEST, HIGHEST = 3.048, 304.8  # m, 10 and 1000 ft above ground: where the turbulence's low-altitude model holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,12 +42,21 @@ class Wind:
         About("what a metre above the start's altitude adds to the steady wind"),
     ] = (0.0, 0.0)
     gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; where they overlap, they add up")] = ()
-    turbulence: Annotated[Literal["none"], About("severity of the turbulence")] = "none"
+    turbulence: Annotated[Literal["none", "light", "moderate", "severe"], About("MIL-F-8785C, low altitude")] = "none"
 
-    def start(self, altitude: float, step: float, duration: float) -> Air:
-        """The air of a flight that starts at `altitude` (m), on its grid of steps (s)."""
+    def start(self, *, airspeed: float, altitude: float, step: float, duration: float, seed: int) -> Air:
+        """The air of a flight at this nominal airspeed and altitude, on its grid of steps. SI."""
         if self == Wind(steady=self.steady):
             return Air(steady=self.steady)
-        time = step * np.arange(round(duration / step) + 1, dtype=np.float64)
+        steps = round(duration / step)
+        time = step * np.arange(steps + 1, dtype=np.float64)
         gusts = sum((gust.at(time) for gust in self.gusts), np.zeros((len(time), 3)))
-        return Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)
+        air = Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)
+        if self.turbulence == "none":
+            return air
+        from harness.turbulence import dryden, turbulence  # SciPy is loaded by those who fly in it
+
+        W_x, W_y = self.steady
+        model = dryden(self.turbulence, airspeed, altitude)
+        field = turbulence(model, math.atan2(W_y, W_x), seed, step, steps)
+        return replace(air, gusts=gusts + field.velocity[field.lead :], rotation=field.rotation)

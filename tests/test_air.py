@@ -22,8 +22,8 @@ WIND = Wind(steady=(1.0, 2.0), gusts=(GUST, Gust(from_=2.0, to=2.5, velocity=(0.
 FLIGHT = Flight(plant="kinematic", law=law("smc"), duration=5.0, wind=WIND)
 
 
-def air(wind: Wind, step: float = 0.005) -> Air:
-    return wind.start(150.0, step, 5.0)
+def air(wind: Wind, step: float = 0.005, duration: float = 5.0) -> Air:
+    return wind.start(airspeed=13.0, altitude=150.0, step=step, duration=duration, seed=0)
 
 
 def test_a_discrete_gust_is_half_of_one_minus_cosine() -> None:
@@ -88,7 +88,7 @@ def test_the_state_of_the_6_dof_aircraft_shows_steady_wind_gust_and_shear_at_its
 
 def test_shear_slows_a_climb_into_the_growing_tailwind() -> None:
     """A lighter aircraft 10 m higher: the airspeed loop has made up for the 1 m/s more that blow from behind."""
-    flying = SixDof(STICK, 0.005, True).start(Start(heading=0.0), Wind(shear=(0.1, 0.0)).start(150.0, 0.005, 60.0))
+    flying = SixDof(STICK, 0.005, True).start(Start(heading=0.0), air(Wind(shear=(0.1, 0.0)), duration=60.0))
     flying.fdm["inner-loop/command/altitude-m"] = 160.0
     flying.advance(0.0, 60.0)
     s = flying.state

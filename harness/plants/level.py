@@ -38,12 +38,11 @@ class Level:
         bank_command: float = math.nan,
     ) -> State:
         """The state now: position, air velocity, and what the plant has beside."""
-        W_x, W_y = self._air.steady
-        gust_x, gust_y, gust_z = self._air.gust(self._step)
-        W_x, W_y = W_x + gust_x, W_y + gust_y
+        W_x, W_y = self._air.horizontal(self._step)
         return State._make(
             (
                 x, y, v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y, v_a, psi, heading_rate, bank, roll_rate,
-                self._altitude, 0.0, math.nan, math.nan, math.nan, math.nan, bank_command, *_UNKNOWN, W_x, W_y, gust_z,
+                self._altitude, 0.0, math.nan, math.nan, math.nan, math.nan, bank_command, *_UNKNOWN, W_x, W_y,
+                self._air.gust(self._step)[2],
             )
         )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -120,12 +120,12 @@ class Trim(NamedTuple):
 
 
 def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
-    """Puts the aircraft at `start`, level and unaccelerated in the steady wind, and gives the trim that does it.
+    """Puts the aircraft at `start`, level and unaccelerated in the wind there, and gives the trim that does it.
 
     Newton's method on the accelerations that JSBSim reports, with the surfaces placed directly: their actuators do not
     run before engagement, so no lag falsifies the result. Raises `NoTrimError` where there is none.
     """
-    _place(fdm, start, air.steady)
+    _place(fdm, start, air.horizontal(0))
     x = Trim(pitch=0.05, elevator=0.0, throttle=0.5)
     for _ in range(30):
         residual = _accelerations(fdm, x)
@@ -261,20 +261,24 @@ class SixDof:
         blow = _blower(fdm, air) if len(air.gusts) else None
         if blow:
             blow()
-            fdm.run_ic()  # trimmed for the steady wind, the aircraft is met by the first gust
+            fdm.run_ic()
         engage(fdm, trimmed, start, self.rate_trim)
         return _SixDofFlying(fdm, self.step, start, air, limits.stall, blow)
 
 
 def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
-    """What puts the air's next gust into JSBSim: that at the end of the step that `run()` then makes."""
+    """What puts the air's next gust into JSBSim: that at the end of the step that `run()` then makes.
+
+    The aircraft started in trim in the horizontal air at the start, which JSBSim has as its steady wind.
+    """
     north, east, down = (
         _node(fdm, f"atmosphere/gust-{axis}-fps").set_double_value for axis in ("north", "east", "down")
     )
     height = _node(fdm, "position/h-sl-ft").get_double_value
     shear_north, shear_east = air.shear
     level = air.altitude / FT
-    rows = chain.from_iterable((air.gusts[k : k + 1000] / FT).tolist() for k in range(0, len(air.gusts), 1000))
+    met_x, met_y, _ = air.gust(0)
+    rows = _rows((air.gusts - (met_x, met_y, 0.0)) / FT)
 
     def blow() -> None:
         above = height() - level
@@ -283,7 +287,27 @@ def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
         east(W_y + shear_east * above)
         down(W_z)
 
-    return blow
+    rotation = air.rotation(FT * fdm["metrics/bw-ft"])
+    if not len(rotation):
+        return blow
+    roll, pitch, yaw = (_node(fdm, f"gust/{axis}-rad_sec").set_double_value for axis in "pqr")
+    heading = _node(fdm, "attitude/psi-rad").get_double_value
+    rates = _rows(rotation)
+
+    def blow_and_turn() -> None:
+        blow()
+        psi = heading()
+        p, q, r_x, r_y = next(rates)
+        roll(p)
+        pitch(q)
+        yaw(r_y * math.cos(psi) - r_x * math.sin(psi))
+
+    return blow_and_turn
+
+
+def _rows(table: NDArray[np.float64]) -> Iterator[list[float]]:
+    """The table's rows, a thousand at a time taken from it: lists of floats cost four times its room."""
+    return chain.from_iterable(table[k : k + 1000].tolist() for k in range(0, len(table), 1000))
 
 
 class _SixDofFlying:
@@ -304,7 +328,7 @@ class _SixDofFlying:
         self._command = _node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
         self._step = step
         self._north, self._east = start.position
-        self._wind = air.steady
+        self._wind, self._at_start = air.steady, air.horizontal(0)
         self._stall, self._stalled_for = stall, 0.0
         self.state = self._read(self._heading())
 
@@ -351,12 +375,13 @@ class _SixDofFlying:
         ]
         *surfaces, gust_x, gust_y, gust_z = others
         W_x, W_y = self._wind
+        gust_x, gust_y = self._at_start[0] + FT * gust_x, self._at_start[1] + FT * gust_y
         heading = math.atan2(FT * v_e - W_y, FT * v_n - W_x)
         return State._make(
             (
                 self._north + FT * n, self._east + FT * e, FT * v_n, FT * v_e, FT * V,
                 heading, wrap(heading - before) / self._step, phi, p, FT * h, FT * v_d, theta, psi, q, r,
-                phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, W_x + FT * gust_x, W_y + FT * gust_y, FT * gust_z,
+                phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, gust_x, gust_y, FT * gust_z,
             )
         )  # fmt: skip
 

@@ -1,0 +1,234 @@
+"""The turbulence against the specification: spectra, variances, stationarity, and the signs of its rotation."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.signal import welch
+
+import aircraft
+from autopilot.laws import law
+from harness.air import Air, Array
+from harness.flight import Flight, air_of, problems
+from harness.plant import Start
+from harness.plants.sixdof import SixDof, load, trim, wind_triangle_error
+from harness.randomness import stream
+from harness.simulation import simulate
+from harness.turbulence import Dryden, _gradient, dryden, lag_chain, turbulence
+from harness.wind import Wind
+
+MODERATE = dryden("moderate", 13.0, 150.0)
+SPAN = 1.27
+FLIGHT = Flight(plant="sixdof", law=law("smc"), duration=10.0, wind=Wind(turbulence="moderate", steady=(2.0, -1.0)))
+BANDS = np.geomspace(0.05, 10.0, 9)  # rad/s
+SPECTRA: dict[str, Callable[[Dryden, Array], Array]] = {
+    "u": Dryden.along,
+    "v": Dryden.across,
+    "w": Dryden.vertical,
+    "p": lambda model, omega: model.roll(omega, SPAN),
+    "q": lambda model, omega: model.pitch(omega, SPAN),
+    "r": lambda model, omega: model.yaw(omega, SPAN),
+}
+
+
+def one(seed: int, step: float, seconds: float, model: Dryden = MODERATE) -> dict[str, Array]:
+    """A realisation with the mean wind, and the flight, to the north: so r is its eastern part."""
+    field = turbulence(model, 0.0, seed, step, round(seconds / step))
+    u, v, w = field.velocity[field.lead :].T
+    p, q, _, r = field.rotation(SPAN).T
+    return {"u": u, "v": v, "w": w, "p": p, "q": q, "r": r}
+
+
+def test_lengths_and_intensities_are_those_of_the_standard() -> None:
+    """MIL-F-8785C, Fig. 10 and 11, at 500 ft: L_w = h, L_u = 1002 ft; sigma_w = 0.1 W20, sigma_u = 1.234 sigma_w."""
+    model = dryden("severe", 20.0, 500.0 * 0.3048)
+    assert model.L_w == pytest.approx(500.0 * 0.3048)
+    assert model.L_u / 0.3048 == pytest.approx(500.0 / (0.177 + 0.000823 * 500.0) ** 1.2)
+    assert model.sigma_w == pytest.approx(4.5 * 0.514444)
+    assert model.sigma_u / model.sigma_w == pytest.approx((0.177 + 0.000823 * 500.0) ** -0.4)
+    at_1000_ft = dryden("light", 20.0, 304.8)
+    assert at_1000_ft.L_u == pytest.approx(304.8)  # isotropic where the low-altitude model ends
+    assert at_1000_ft.sigma_u == pytest.approx(at_1000_ft.sigma_w)
+
+
+@pytest.mark.parametrize("axis", ["u", "v", "w"])
+def test_a_spectrum_integrates_to_the_variance(axis: str) -> None:
+    variance, _ = quad(lambda omega: SPECTRA[axis](MODERATE, np.array(omega)), 0.0, np.inf)
+    assert variance == pytest.approx({"u": MODERATE.sigma_u, "v": MODERATE.sigma_u, "w": MODERATE.sigma_w}[axis] ** 2)
+
+
+@pytest.mark.parametrize("step", [1e-5, 0.005, 0.05, 2.0])
+def test_the_discretisation_is_exact(step: float) -> None:
+    """Closed forms of two lags in a row: transition, stationary covariance, and that a step leaves this as it is."""
+    T = 11.0
+    lags = lag_chain(T, 2, step)
+    decay = math.exp(-step / T)
+    assert lags.transition == pytest.approx(np.array([[decay, 0.0], [decay * step / T, decay]]), rel=1e-12)
+    stationary = lags.stationary @ lags.stationary.T
+    assert stationary == pytest.approx(np.array([[0.5, 0.25], [0.25, 0.25]]) / T, rel=1e-12)
+    added = lags.added @ lags.added.T
+    assert lags.transition @ stationary @ lags.transition.T + added == pytest.approx(stationary, rel=1e-12)
+    response = (lambda s: math.exp(-s / T) / T, lambda s: s / T * math.exp(-s / T) / T)
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        integral, _ = quad(lambda s, i=i, j=j: response[i](s) * response[j](s), 0.0, step, epsabs=0.0, epsrel=1e-12)
+        assert added[i, j] == pytest.approx(integral, rel=1e-6)
+
+
+@pytest.mark.parametrize(("step", "within"), [(0.005, 0.01), (0.05, 0.1)])
+@pytest.mark.parametrize("axis", ["u", "v", "w"])
+def test_the_sampled_process_has_the_spectrum_of_the_specification(axis: str, step: float, within: float) -> None:
+    """Not estimated: the discrete process' own spectrum, from transition and covariance; what differs is aliased."""
+    length, sigma = (MODERATE.L_w, MODERATE.sigma_w) if axis == "w" else (MODERATE.L_u, MODERATE.sigma_u)
+    T = length / 13.0
+    C = np.array([math.sqrt(2.0 * T)] if axis == "u" else [math.sqrt(3.0 * T), math.sqrt(T) - math.sqrt(3.0 * T)])
+    lags = lag_chain(T, len(C), step)
+    for omega in np.geomspace(0.05, 10.0, 40):
+        H = sigma * C @ np.linalg.inv(np.exp(1j * omega * step) * np.eye(len(C)) - lags.transition) @ lags.added
+        spectrum = float(np.sum(np.abs(H) ** 2)) * step / math.pi
+        assert spectrum == pytest.approx(SPECTRA[axis](MODERATE, np.array(omega)).item(), rel=within)
+
+
+@lru_cache
+def measured(step: float) -> tuple[Array, dict[str, Array], dict[str, float]]:
+    """Frequencies in rad/s, spectra per rad/s by Welch, and variances: the mean of some hours of flight."""
+    seeds, spectra, variances = range(24), {}, {}
+    for seed in seeds:
+        for axis, values in one(seed, step, 3600.0).items():
+            f, per_hertz = welch(values, 1.0 / step, nperseg=round(400.0 / step), detrend=False)
+            spectra[axis] = spectra.get(axis, 0.0) + per_hertz / (2.0 * math.pi) / len(seeds)
+            variances[axis] = variances.get(axis, 0.0) + float(np.mean(values**2)) / len(seeds)
+    return 2.0 * math.pi * f, spectra, variances
+
+
+@pytest.mark.parametrize("step", [0.02, 0.05])
+@pytest.mark.parametrize("axis", SPECTRA)
+def test_realisations_have_the_variance_and_the_spectrum_of_the_specification(axis: str, step: float) -> None:
+    omega, spectra, variances = measured(step)
+    expected = SPECTRA[axis](MODERATE, omega)
+    for low, high in pairwise(BANDS):
+        inside = (low <= omega) & (omega < high)
+        assert spectra[axis][inside].mean() == pytest.approx(expected[inside].mean(), rel=0.1)
+    nyquist = math.pi / step
+    variance, _ = quad(lambda w: SPECTRA[axis](MODERATE, np.array(w)), 0.0, nyquist, limit=500)
+    assert variances[axis] == pytest.approx(variance, rel=0.1)
+
+
+def test_it_is_stationary_from_the_first_sample() -> None:
+    """Variances over 2000 seeds, at the start and later; their standard error is 3 %."""
+    times = (0, 1, 10, 100)
+    flights = [one(seed, 0.025, 2.5) for seed in range(2000)]
+    for axis, spectrum in SPECTRA.items():
+        variance, _ = quad(lambda w, s=spectrum: s(MODERATE, np.array(w)), 0.0, math.pi / 0.025, limit=500)
+        for k in times:
+            assert np.mean([f[axis][k] ** 2 for f in flights]) == pytest.approx(variance, rel=0.12), (axis, k)
+
+
+def test_a_longer_flight_begins_as_a_shorter_one() -> None:
+    short, long = (air_of(replace(FLIGHT, duration=t)) for t in (10.0, 20.0))
+    assert np.array_equal(long.gusts[:2001], short.gusts)
+    assert np.array_equal(long.rotation(SPAN)[:2001], short.rotation(SPAN))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"plant": "kinematic"},
+        {"law": law("nftsm")},
+        {"guidance_period": 0.5},
+        {"aircraft": "skywalker_x8"},
+        {"start": Start(heading=2.0, position=(0.0, 500.0))},
+    ],
+)
+def test_the_air_is_the_same_whatever_flies_in_it(changes: dict[str, object]) -> None:
+    other = air_of(replace(FLIGHT, **changes))
+    assert np.array_equal(other.gusts, air_of(FLIGHT).gusts)
+    assert np.array_equal(other.rotation(SPAN), air_of(FLIGHT).rotation(SPAN))
+
+
+def test_seeds_and_purposes_have_nothing_to_do_with_each_other() -> None:
+    """Correlations of the noises; 20000 samples: one standard error is 0.007."""
+    noises = [stream(seed, "turbulence").standard_normal(20000) for seed in range(3)]
+    noises += [stream(0, purpose).standard_normal(20000) for purpose in ("sensor", "turbulence, roll")]
+    apart = np.corrcoef(noises) - np.eye(5)
+    assert np.abs(apart).max() < 0.03
+    u, v, w, p = (one(0, 0.05, 18000.0)[axis] for axis in "uvwp")
+    assert np.abs(np.corrcoef([u, v, w, p]) - np.eye(4)).max() < 0.1
+
+
+def test_the_axes_turn_with_the_mean_wind() -> None:
+    north, east, other = (turbulence(MODERATE, towards, 3, 0.05, 100).velocity for towards in (0.0, math.pi / 2, 0.7))
+    u, v, w = north.T
+    assert east == pytest.approx(np.column_stack([-v, u, w]))
+    assert np.hypot(other[:, 0], other[:, 1]) == pytest.approx(np.hypot(u, v))
+
+
+def test_a_field_that_grows_ahead_turns_the_air_as_a_rigid_rotation_would() -> None:
+    """In a rotation about y, -q = dw/dx; about z, r = dv/dx. Flying at V into a slope k, velocities grow by k V t."""
+    V, k, t = 13.0, 0.02, 0.005 * np.arange(2000)
+    slope = _gradient(np.outer(k * V * t, [1.0]), V, 0.12, 0.005)[:, 0]
+    assert slope[-1] == pytest.approx(k)
+    field = turbulence(MODERATE, 0.0, 1, 0.005, 4000)
+    _, q, _, r_y = field.rotation(SPAN).T
+    down, east = field.velocity[field.lead :, 2], field.velocity[field.lead :, 1]
+    assert np.corrcoef(q[1:], -np.diff(down))[0, 1] > 0.1
+    assert np.corrcoef(r_y[1:], np.diff(east))[0, 1] > 0.1
+
+
+@pytest.mark.parametrize(("axis", "moment"), [("p", "l"), ("q", "m"), ("r", "n")])
+def test_air_that_rotates_acts_as_the_aircraft_rotating_the_other_way(axis: str, moment: str) -> None:
+    fdm = load(aircraft.folder("ultra_stick_25e"), 0.005)
+    trim(fdm, Start(), Air())
+
+    def moments(of_air: float, of_aircraft: float) -> float:
+        fdm[f"gust/{axis}-rad_sec"] = of_air
+        fdm[f"ic/{axis}-rad_sec"] = of_aircraft
+        fdm.run_ic()
+        return float(fdm[f"moments/{moment}-aero-lbsft"])
+
+    none = moments(0.0, 0.0)
+    turned = moments(0.1, 0.0)
+    assert abs(turned - none) > 1e-3
+    assert turned == pytest.approx(moments(0.0, -0.1), abs=1e-12)
+    assert none == pytest.approx(moments(0.1, 0.1), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", aircraft.names())
+def test_jsbsim_flies_in_the_turbulence(name: str) -> None:
+    start = Start(airspeed=float(aircraft.data(aircraft.folder(name))["envelope"]["V_design"]["v"]), heading=2.0)
+    assert wind_triangle_error(aircraft.folder(name), start, air_of(FLIGHT)) < 1e-6
+
+
+def test_the_aircraft_meets_the_rotation_about_its_own_axes() -> None:
+    flying = SixDof(aircraft.folder("ultra_stick_25e"), 0.005, True).start(Start(heading=2.0), air_of(FLIGHT))
+    flying.advance(0.1, 1.0)
+    p, q, r_x, r_y = air_of(FLIGHT).rotation(1.27)[200]
+    yaw = flying.state.yaw
+    met = [flying.fdm[f"gust/{axis}-rad_sec"] for axis in "pqr"]
+    assert met == pytest.approx([p, q, r_y * math.cos(yaw) - r_x * math.sin(yaw)], rel=1e-2)
+
+
+@pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
+def test_a_flight_in_turbulence_flown_twice_is_the_same_to_the_last_bit(plant: str) -> None:
+    flight = replace(FLIGHT, plant=plant)
+    digest = simulate(flight).digest
+    assert simulate(flight).digest == digest
+    assert simulate(replace(flight, seed=1)).digest != digest
+    assert simulate(replace(flight, wind=Wind(steady=(2.0, -1.0)))).digest != digest
+
+
+@pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
+def test_the_log_shows_the_air_of_the_flight(plant: str) -> None:
+    log = simulate(replace(FLIGHT, plant=plant))
+    flown = np.column_stack([log["wind_north"], log["wind_east"], log["wind_down"]])
+    assert flown == pytest.approx(air_of(FLIGHT).gusts[::10] + np.array((2.0, -1.0, 0.0)), abs=1e-9)
+
+
+def test_a_start_above_the_models_range_is_refused() -> None:
+    (problem,) = problems(replace(FLIGHT, start=Start(altitude=400.0)))
+    assert problem.name == "wind.turbulence"
+    assert problem.message == "the low-altitude model holds from 3.048 to 304.8 m; the flight starts at 400 m"
