@@ -98,7 +98,7 @@ def test_a_mirrored_flight_mirrors_the_flight(plant: str, tolerance: float) -> N
 
 def test_a_flight_into_the_ground_ends_as_ground() -> None:
     flying = SixDof(STICK, STEP, True).start(Start(altitude=30.0), Air())
-    flying._run.__self__["inner-loop/command/altitude-m"] = -100.0
+    flying.fdm["inner-loop/command/altitude-m"] = -100.0
     with pytest.raises(End) as end:
         for _ in range(2000):
             flying.advance(0.0, 0.05)
@@ -115,8 +115,7 @@ def test_a_number_that_is_not_finite_ends_the_flight_as_invalid() -> None:
 
 def test_a_roll_beyond_80_degrees_ends_as_departed() -> None:
     flying = SixDof(STICK, STEP, True).start(Start(), Air())
-    fdm = flying._run.__self__
-    fdm["inner-loop/gain/bank-p"] = -0.9  # a bank loop with its sign turned round
+    flying.fdm["inner-loop/gain/bank-p"] = -0.9  # a bank loop with its sign turned round
     with pytest.raises(End) as end:
         for _ in range(400):
             flying.advance(0.05, 0.05)
@@ -125,7 +124,8 @@ def test_a_roll_beyond_80_degrees_ends_as_departed() -> None:
 
 def test_a_stall_that_lasts_ends_as_departed() -> None:
     flying = SixDof(STICK, STEP, True).start(Start(), Air())
-    flying._run.__self__["inner-loop/command/airspeed-mps"] = 5.0
+    flying.fdm["inner-loop/limit/angle-of-attack-rad"] = 1.0  # the pitch hold as if there were no stall
+    flying.fdm["inner-loop/command/airspeed-mps"] = 5.0
     with pytest.raises(End, match="stalled for 3 s") as end:
         for _ in range(400):
             flying.advance(0.0, 0.05)
