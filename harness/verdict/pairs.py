@@ -49,7 +49,7 @@ def settings_of(flights: pd.DataFrame) -> list[str]:
 
 def varying(flights: pd.DataFrame) -> list[str]:
     """The settings that are not the same in all flights."""
-    return [column for column in settings_of(flights) if _text(flights[column]).nunique() > 1]
+    return [column for column in settings_of(flights) if flights[column].nunique(dropna=False) > 1]
 
 
 def plant_pairs(flights: pd.DataFrame, baseline: str) -> Pairs:
@@ -80,11 +80,11 @@ def pairs(flights: pd.DataFrame, differing: Sequence[str], is_reference: pd.Seri
     at = {key: i for i, key in zip(reference.index, alike[is_reference], strict=True)}
     partner = alike[~is_reference].map(at)
     found = partner.dropna()
-    used = set(found)
+    left = ~(flights.index.isin(found) | flights.index.isin(found.index))
     return Pairs(
         flights.loc[found.to_numpy()].reset_index(drop=True),
         flights.loc[found.index].reset_index(drop=True),
-        flights[[i not in used and i not in found.index for i in flights.index]],
+        flights[left],
     )
 
 
@@ -178,11 +178,16 @@ def _alike(flights: pd.DataFrame, differing: Sequence[str]) -> pd.Series:
     columns = [column for column in varying(flights) if column not in differing]
     if not columns:
         return pd.Series("", index=flights.index)
-    return flights[columns].map(str).agg("|".join, axis=1)
+    return pd.Series(joined(flights, columns), index=flights.index)
+
+
+def joined(table: pd.DataFrame, columns: Sequence[str]) -> list[str]:
+    """A text per row, equal for rows that are equal in these columns."""
+    return list(map("|".join, zip(*(map(str, table[column].tolist()) for column in columns), strict=True)))
 
 
 def _text(column: pd.Series) -> pd.Series:
-    return column.map(str)
+    return pd.Series(list(map(str, column.tolist())), index=column.index, dtype=object)
 
 
 def _why_unpaired(flights: pd.DataFrame, baseline: str) -> str:

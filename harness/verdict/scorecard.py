@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.verdict.assess import Assess
-from harness.verdict.pairs import Pairs, axes, is_ordered, spread
+from harness.verdict.pairs import Pairs, axes, is_ordered, joined, spread
 from harness.verdict.parts import PARTS, Part
 from harness.verdict.statistics import Effect, Share, effect, equivalence, holm, mcnemar, share
 
@@ -143,9 +143,10 @@ def _groups(table: pd.DataFrame, columns: list[str]) -> Groups:
     """The cells: what is set in each, and its rows."""
     if not columns:
         return [({}, np.arange(len(table)))]
-    text = table[columns].map(str).agg("|".join, axis=1)
-    rows = [np.asarray(indices) for indices in text.reset_index(drop=True).groupby(text.to_numpy()).indices.values()]
-    rows.sort(key=lambda indices: indices[0])
+    of: dict[str, list[int]] = {}
+    for row, text in enumerate(joined(table, columns)):
+        of.setdefault(text, []).append(row)
+    rows = [np.asarray(indices) for indices in of.values()]
     return [({c: table[c].iloc[indices[0]] for c in columns}, indices) for indices in rows]
 
 
