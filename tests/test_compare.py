@@ -247,7 +247,13 @@ def test_markdown_says_the_same_and_how_it_was_made(flown: Path, tmp_path: Path)
     assert text.startswith("# Two limits\n\nDoes it hold at 5 and at 20 deg/s?\n\n10 pairs of sixdof beside kinematic")
     for sentence in compared(flown)["answer"]:
         assert sentence in text
-    for heading in ("## The answer", "## Scorecards", "## What breaks first, and where", "## Attribution"):
+    for heading in (
+        "## The answer",
+        "## Scorecards",
+        "## What breaks first, and where",
+        "## What it costs",
+        "## Attribution",
+    ):
         assert heading in text
     assert "harness run" in text
     assert f"harness report {flown} --markdown docs/results.md" in text

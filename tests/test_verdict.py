@@ -301,7 +301,7 @@ def test_one_flight_each_is_one_difference_without_interval() -> None:
     assert sideslip.effect.low is None
     assert "one seed" in sideslip.effect.why
     assert sideslip.verdict == HOLDS
-    assert "no interval (one seed: nothing was drawn): " in "\n".join(lines(found(flights)))
+    assert "No interval (one seed: nothing was drawn): " in "\n".join(lines(found(flights)))
 
 
 def test_the_bank_limit_is_the_airframes() -> None:

@@ -36,6 +36,11 @@ LADDER: Mapping[str, str] = MappingProxyType(
 )
 
 
+def rung(plant: str) -> int:
+    """How far up the ladder; a plant that is none of its rungs stands below."""
+    return list(LADDER).index(plant) if plant in LADDER else -1
+
+
 @dataclass(frozen=True, slots=True)
 class Disturbance:
     """Something that a setting adds to the reference conditions."""
@@ -112,33 +117,32 @@ def _same_scenarios(flights: pd.DataFrame, rungs: Sequence[str]) -> dict[str, pd
     if len(rungs) == 1:
         return {rungs[0]: flights[first]}
     by_rung = []
-    for rung in rungs[1:]:
-        two = flights[first | (flights["plant"] == rung)]
+    for above in rungs[1:]:
+        two = flights[first | (flights["plant"] == above)]
         by_rung.append(pairs(two, ["plant"], two["plant"] == rungs[0]))
     common = reduce(np.intersect1d, [paired.reference["key"].to_numpy() for paired in by_rung])
     return {
         rungs[0]: by_rung[0].reference.set_index("key", drop=False).loc[common],
         **{
-            rung: paired.other.set_index(paired.reference["key"]).loc[common]
-            for rung, paired in zip(rungs[1:], by_rung, strict=True)
+            above: paired.other.set_index(paired.reference["key"]).loc[common]
+            for above, paired in zip(rungs[1:], by_rung, strict=True)
         },
     }
 
 
 def _ladder(metric: str, on: Mapping[str, pd.DataFrame]) -> Ladder:
     rungs = list(on)
-    start, end = (_seed_mean(on[rung], metric) for rung in (rungs[0], rungs[-1]))
+    start, end = (_seed_mean(on[plant], metric) for plant in (rungs[0], rungs[-1]))
     steps = tuple(
-        _step(metric, _between(below, rung), rung, Pairs(on[below], on[rung], on[rung].iloc[:0]))
-        for below, rung in pairwise(rungs)
+        _step(metric, _between(below, above), above, Pairs(on[below], on[above], on[above].iloc[:0]))
+        for below, above in pairwise(rungs)
     )
     return Ladder(metric, start, steps, end)
 
 
-def _between(below: str, rung: str) -> str:
+def _between(below: str, above: str) -> str:
     """What a rung adds to one below it, rungs that were not flown included."""
-    names = list(LADDER)
-    return ", ".join(LADDER[name] for name in names[names.index(below) + 1 : names.index(rung) + 1])
+    return ", ".join(list(LADDER.values())[rung(below) + 1 : rung(above) + 1])
 
 
 def _seed_mean(flights: pd.DataFrame, metric: str) -> float:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from harness.metrics import MEANING
 from harness.verdict.assess import Assess
-from harness.verdict.attribution import LADDER, Attribution, attributions
+from harness.verdict.attribution import Attribution, attributions, rung
 from harness.verdict.pairs import FAILED, Pairs, axes, entered, plant_pairs, spread, varying
 from harness.verdict.parts import with_quantities
 from harness.verdict.scorecard import Scorecard, scorecards
@@ -48,14 +48,18 @@ class Comparison:
     unpaired: tuple[Left, ...]
     failed: tuple[Left, ...]
     rows: tuple[Row, ...]
-    scorecards: tuple[Scorecard, ...]
+    scorecards: tuple[Scorecard, ...]  # from the top of the ladder down
     attributions: tuple[Attribution, ...]
 
     @property
     def last_plant(self) -> str:
         """The plant furthest up the ladder: the one the answer is about."""
-        plants = [card.plant for card in self.scorecards]
-        return max(plants, key=lambda plant: list(LADDER).index(plant) if plant in LADDER else -1)
+        return max((card.plant for card in self.scorecards), key=rung)
+
+    @property
+    def plants(self) -> list[str]:
+        """All but the baseline, up the ladder."""
+        return sorted({card.plant for card in self.scorecards}, key=rung)
 
     @property
     def answering(self) -> list[Scorecard]:
@@ -76,7 +80,7 @@ def compare(flights: pd.DataFrame, assess: Assess, baseline: str = "kinematic") 
         tuple(_left(paired.unpaired, table)),
         tuple(_left(table[failed], table)),
         tuple(_rows(paired)),
-        tuple(scorecards(paired, assess, baseline)),
+        tuple(sorted(scorecards(paired, assess, baseline), key=lambda card: -rung(card.plant))),
         tuple(attributions(table[~failed])),
     )
 

@@ -47,15 +47,15 @@ PARTS: tuple[Part, ...] = (
         _up_to(lambda a: a.airspeed_deviation), 0.0, threshold="airspeed_deviation",
     ),
     Part(
-        "gain", "heading rate followed: gain", "heading_rate_gain", "of the command",
+        "gain", "heading rate followed (gain)", "heading_rate_gain", "of the command",
         _within(lambda a: a.heading_rate_gain), 1.0, threshold="heading_rate_gain",
     ),
     Part(
-        "lag", "heading rate followed: lag", "heading_rate_lag_s", "s",
+        "lag", "heading rate followed (lag)", "heading_rate_lag_s", "s",
         _up_to(lambda a: a.heading_rate_lag), 0.0, threshold="heading_rate_lag_s",
     ),
     Part(
-        "lag_k2", "heading rate followed: lag x k2", "lag_times_k2", "1",
+        "lag_k2", "heading rate followed (lag x k2)", "lag_times_k2", "1",
         _up_to(lambda a: a.lag_times_k2), 0.0, threshold="lag_times_k2",
     ),
     Part(

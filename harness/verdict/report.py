@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from harness.metrics import MEANING
 from harness.settings.written import written
 from harness.verdict import figures, words
 from harness.verdict.attribution import METRICS, Attribution
-from harness.verdict.comparison import Comparison, axes_of
+from harness.verdict.comparison import Comparison, Row, axes_of
 from harness.verdict.pairs import settings_of, varying
 from harness.verdict.scorecard import Finding, Scorecard, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
@@ -58,6 +59,17 @@ class Shading(NamedTuple):
     of: int
 
 
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The paired differences of one airframe under one law: per metric and plant, as far as they are there."""
+
+    aircraft: str
+    law: str
+    plants: list[str]
+    pairs: int
+    metrics: dict[str, dict[str, Row]]
+
+
 def page(comparison: Comparison, origin: Origin) -> str:
     """The HTML page."""
     return _rendered("report.html.jinja", comparison, origin, autoescape=True)
@@ -88,6 +100,7 @@ def _rendered(template: str, comparison: Comparison, origin: Origin, *, autoesca
         metrics=METRICS,
         shading=shading,
         breaks_first=words.breaks_first,
+        tables=list(_tables(comparison)),
         distributions=_distributions(comparison) if html else None,
         attributions=[
             (a, _attributed(a) if html else []) for a in comparison.attributions[: MOST_DRAWN if html else None]
@@ -98,6 +111,17 @@ def _rendered(template: str, comparison: Comparison, origin: Origin, *, autoesca
         resamples=RESAMPLES,
         least_seeds=LEAST_SEEDS,
     )
+
+
+def _tables(comparison: Comparison) -> Iterator[Table]:
+    for kind in dict.fromkeys((row.aircraft, row.law) for row in comparison.rows):
+        those = [row for row in comparison.rows if (row.aircraft, row.law) == kind]
+        metrics: dict[str, dict[str, Row]] = {metric: {} for metric in MEANING}
+        for row in those:
+            metrics[row.metric][row.plant] = row
+        plants = [plant for plant in comparison.plants if any(row.plant == plant for row in those)]
+        pairs = max(row.difference.pairs for row in those)
+        yield Table(*kind, plants, pairs, {metric: rows for metric, rows in metrics.items() if rows})
 
 
 def _distributions(comparison: Comparison) -> Figure:

@@ -154,10 +154,9 @@ def lines(comparison: Comparison) -> Iterator[str]:
 
 def heading(comparison: Comparison) -> Iterator[str]:
     """What was compared, and what could not be."""
-    plants = sorted({card.plant for card in comparison.scorecards})
     seeds = comparison.pairs.other["seed"].nunique()
     yield (
-        f"{len(comparison.pairs)} pairs of {', '.join(plants)} beside {comparison.baseline}, {seeds} "
+        f"{len(comparison.pairs)} pairs of {', '.join(comparison.plants)} beside {comparison.baseline}, {seeds} "
         f"seed{'s' if seeds != 1 else ''}, from {comparison.flights} flights"
     )
     yield from _left("have no partner", comparison.unpaired)
@@ -216,7 +215,7 @@ def without_interval(card: Scorecard) -> Iterator[str]:
     measured_without = [f for f in card.findings if f.cells and f.effect.low is None and f.part.name != "reach"]
     for why in dict.fromkeys(finding.effect.why for finding in measured_without):
         titles = [finding.part.title for finding in measured_without if finding.effect.why == why]
-        yield f"no interval ({why}): {', '.join(titles)}"
+        yield f"No interval ({why}): {', '.join(titles)}."
 
 
 def _finding_cells(finding: Finding) -> tuple[str, ...]:
