@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from harness.review.recording import read_recording as read_flight
+    from harness.review.reading import read_recording as read_flight
     from harness.runs.results import load_results
     from harness.settings import load_flight
     from harness.simulation import simulate
@@ -18,7 +18,7 @@ __all__ = ["load_flight", "load_results", "read_flight", "simulate"]
 _HOME = {
     "load_flight": ("harness.settings", "load_flight"),
     "load_results": ("harness.runs.results", "load_results"),
-    "read_flight": ("harness.review.recording", "read_recording"),
+    "read_flight": ("harness.review.reading", "read_recording"),
     "simulate": ("harness.simulation", "simulate"),
 }
 

@@ -76,16 +76,8 @@ def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
         for other in (f for f in flown if f[:2] == reference[:2] and f.plant != KINEMATIC):
             path = folder / f"{other.case.name}_{other.law}_{other.plant}.rrd"
             title = f"{other.case.title}: {other.law}, {KINEMATIC} and {other.plant}"
-            write_recording(path, {KINEMATIC: reference.log, other.plant: other.log}, title, notes([reference, other]))
+            write_recording(path, {KINEMATIC: reference.log, other.plant: other.log}, title, command="harness demo")
             yield path
-
-
-def notes(flown: list[Flown]) -> str:
-    """A Markdown table of the metrics, a column per flight."""
-    lines = ["| | " + " | ".join(f.plant for f in flown) + " |", "|---|" + "---|" * len(flown)]
-    lines.append("| outcome | " + " | ".join(f.log.outcome.value for f in flown) + " |")
-    lines += [f"| {name} | " + " | ".join(number(f.metrics[name]) for f in flown) + " |" for name in flown[0].metrics]
-    return "\n".join(lines)
 
 
 SHOWN: Mapping[str, tuple[str, str, float]] = MappingProxyType(

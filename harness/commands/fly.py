@@ -31,7 +31,7 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     """
     import json
 
-    from harness.commands.telling import BadInput, feasibility_line, flight_of, number, read_file, writable
+    from harness.commands.telling import BadInput, feasibility_line, flight_of, number, read_file, typed, writable
     from harness.flight import warnings
     from harness.key import identity
     from harness.metrics import MEANING
@@ -57,11 +57,8 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     if rrd is not None:
         from harness.review.recording import write_recording
 
-        rows = "\n".join(f"| {name} | {number(value)} |" for name, value in result["metrics"].items())
-        set_to = json.dumps(result["flight"], indent=1)
-        notes = f"{feasibility_line(flight)}\n\n| metric | |\n|---|---|\n{rows}\n\n```json\n{set_to}\n```"
         try:
-            write_recording(rrd, {flight.plant: log}, Path(what).stem, notes)
+            write_recording(rrd, {flight.plant: log}, Path(what).stem, command=typed())
         except OSError as error:
             raise BadInput(f"{rrd}: cannot be written: {error.strerror or error}") from None
     if as_json:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
+import sys
 import tempfile
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -49,6 +51,11 @@ def flight_of(file: SettingsFile) -> Flight:
     except PlantError as error:
         raise BadInput(f"{file.locate(error.key)}: {error}") from None
     return flight
+
+
+def typed() -> str:
+    """The command as it was typed."""
+    return shlex.join(["harness", *sys.argv[1:]])
 
 
 def feasibility_line(flight: Flight) -> str:

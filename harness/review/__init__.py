@@ -1,1 +1,1 @@
-"""Reviewing flights: recordings, their layout, and the viewer. The only folder with Rerun in it."""
+"""Looking at flights in Rerun: recordings written and read, the viewer, and flights shown while they are flown."""

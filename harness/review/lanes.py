@@ -1,0 +1,214 @@
+"""Lanes of states over a flight, and its events: what a reader would otherwise have to find in the curves."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import aircraft
+from harness.flight_log import FlightLog
+from harness.metrics import metrics
+from harness.plant import Outcome
+from harness.review.shown import Colour
+
+WINDOW = 1.0  # s: a lane tells of windows this long, so that a command that chatters can be read
+MOST_EVENTS = 30  # of one lane; a lane that changes more often is told as one event
+GUSTS = (0.25, 0.1)  # of the nominal airspeed
+
+_GREEN, _BLUE, _AMBER, _RED, _SLATE = (70, 150, 80), (60, 115, 175), (200, 130, 40), (200, 60, 60), (85, 90, 100)
+COLOURS: Mapping[str, Colour] = MappingProxyType(
+    {
+        "not converged": _SLATE,
+        "outside tolerance": _SLATE,
+        "within tolerance": _BLUE,
+        "converged": _GREEN,
+        "free": _SLATE,
+        "on and off the limit": _AMBER,
+        "at the limit": _RED,
+        "normal": _SLATE,
+        "bank at its limit": _AMBER,
+        "beyond the stall angle": _RED,
+        "calm": _SLATE,
+        "gusts above 10 %": _AMBER,
+        "gusts above 25 %": _RED,
+        "at rest": _SLATE,
+        "straight": _SLATE,
+        "turning": _BLUE,
+        "faster": _AMBER,
+        "slower": _AMBER,
+        **{outcome.value: _RED for outcome in Outcome if outcome is not Outcome.COMPLETED},
+    }
+)
+
+
+class Change(NamedTuple):
+    """From `time` on, s, a lane is in this state."""
+
+    time: float
+    state: str
+
+
+class Event(NamedTuple):
+    """Something that happened; `level` as Rerun's text log has them."""
+
+    time: float
+    level: str
+    text: str
+
+
+def lanes(log: FlightLog) -> dict[str, list[Change]]:
+    """The lanes of a flight by name. A lane that would say nothing is left out."""
+    if not len(log):
+        return {}
+    made = {
+        "circle": _circle(log),
+        "command": command_lane(log),
+        "aircraft": _aircraft(log),
+        "air": _air(log),
+        "target": _target(log),
+    }
+    return {name: [*changes, *_ending(log)] for name, changes in made.items() if changes}
+
+
+def summary(log: FlightLog) -> list[Change]:
+    """One lane for the whole flight: converged or not; before that whether the command is at its limit."""
+    if not len(log):
+        return []
+    limits, circle = command_lane(log), _circle(log)
+    since = next((change.time for change in circle if change.state == "converged"), math.inf)
+    before = [Change(time, "not converged" if state == "free" else state) for time, state in limits if time < since]
+    settled = [Change(since, "converged")] if math.isfinite(since) else []
+    return [*_merged([*before, *settled]), *_ending(log)]
+
+
+def events(log: FlightLog, others: bool = False) -> list[Event]:
+    """What happened, in the order of time; as one of the `others`, without what target and air do for all."""
+    if not len(log):
+        return [Event(0.0, "WARN", _end_text(log))]
+    found = [*_crossing(log), *(() if others else _gust(log))]
+    for name, changes in lanes(log).items():
+        if others and name in ("air", "target"):
+            continue
+        told = [change for change in changes if change.state != log.outcome.value]
+        if len(told) > MOST_EVENTS:
+            found.append(Event(told[0].time, "INFO", f"{name}: {told[0].state}; then {len(told) - 1} changes"))
+        else:
+            found += [Event(time, _level(state), f"{name}: {state}") for time, state in told]
+    completed = log.outcome is Outcome.COMPLETED
+    found.append(Event(float(log["time"][-1]), "INFO" if completed else "WARN", _end_text(log)))
+    return sorted(found, key=lambda event: event.time)
+
+
+def command_lane(log: FlightLog) -> list[Change]:
+    """Whether the command is at its limit: all of a window, part of it, or not at all."""
+    held = np.abs(log["heading_rate_command"]) < np.abs(log["unlimited_command"])
+    shares = [float(part.mean()) for part in _windows(log, held.astype(float))]
+    return _lane(log, ["at the limit" if s == 1.0 else "on and off the limit" if s else "free" for s in shares])
+
+
+def _circle(log: FlightLog) -> list[Change]:
+    settled = metrics(log)["convergence_time_s"]
+    tolerance = log.flight.metrics.tolerance
+    inside = [bool((np.abs(part) < tolerance).all()) for part in _windows(log, log["range_error"])]
+    changes = _lane(log, ["within tolerance" if one else "outside tolerance" for one in inside])
+    if settled is None:
+        return changes
+    return [*(change for change in changes if change.time < settled), Change(settled, "converged")]
+
+
+def _aircraft(log: FlightLog) -> list[Change]:
+    """Stall and bank limit, as the airframe's own data have them; nothing of a plant without an airframe."""
+    if np.isnan(log["angle_of_attack"]).all():
+        return []
+    airframe = aircraft.folder(log.flight.aircraft)
+    stall, limit = aircraft.data(airframe)["aero"]["alpha_stall"]["v"], aircraft.bank_limit(airframe)
+    stalled = _windows(log, (log["angle_of_attack"] >= stall).astype(float))
+    banked = _windows(log, (np.abs(log["bank_command"]) >= limit - 1e-9).astype(float))
+    states = [
+        "beyond the stall angle" if s.any() else "bank at its limit" if b.any() else "normal"
+        for s, b in zip(stalled, banked, strict=True)
+    ]
+    return _lane(log, states)
+
+
+def _air(log: FlightLog) -> list[Change]:
+    """Windows by their strongest gust; nothing in steady wind."""
+    gusts = _gusts(log) / log.flight.start.airspeed
+    if not (gusts > 1e-9).any():
+        return []
+    peaks = [float(part.max()) for part in _windows(log, gusts)]
+    names = [next((f"gusts above {100 * level:.0f} %" for level in GUSTS if peak > level), "calm") for peak in peaks]
+    return _lane(log, names)
+
+
+def _target(log: FlightLog) -> list[Change]:
+    """What a moving target does."""
+    speed = np.hypot(log["target_velocity_north"], log["target_velocity_east"])
+    acceleration, turn = log["target_acceleration"], log["target_turn_rate"]
+    if not speed.any():
+        return []
+    states = np.select(
+        [acceleration > 1e-6, acceleration < -1e-6, np.abs(turn) > 1e-6, speed > 1e-6],
+        ["faster", "slower", "turning", "straight"],
+        "at rest",
+    )
+    changed = np.flatnonzero(np.append(True, states[1:] != states[:-1]))
+    return [Change(float(log["time"][i]), str(states[i])) for i in changed]
+
+
+def _ending(log: FlightLog) -> list[Change]:
+    """How a flight ended early."""
+    return [] if log.outcome is Outcome.COMPLETED else [Change(float(log["time"][-1]), log.outcome.value)]
+
+
+def _crossing(log: FlightLog) -> Iterator[Event]:
+    error = log["range_error"]
+    crossed = np.flatnonzero(error * error[0] < 0)
+    if crossed.size:
+        yield Event(float(log["time"][crossed[0]]), "INFO", "crosses the circle for the first time")
+        worst = crossed[np.abs(error[crossed]).argmax()]
+        yield Event(float(log["time"][worst]), "INFO", f"largest overshoot, {abs(error[worst]):.3g} m")
+
+
+def _gust(log: FlightLog) -> Iterator[Event]:
+    gusts = _gusts(log)
+    if (gusts > 1e-9).any():
+        strongest = int(gusts.argmax())
+        yield Event(float(log["time"][strongest]), "INFO", f"strongest gust, {gusts[strongest]:.3g} m/s")
+
+
+def _gusts(log: FlightLog) -> NDArray[np.float64]:
+    W_x, W_y = log.flight.wind.steady
+    square = (log["wind_north"] - W_x) ** 2 + (log["wind_east"] - W_y) ** 2 + log["wind_down"] ** 2
+    return np.asarray(np.sqrt(square), dtype=np.float64)
+
+
+def _end_text(log: FlightLog) -> str:
+    return f"{log.outcome.value}{': ' if log.reason else ''}{log.reason}"
+
+
+def _level(state: str) -> str:
+    return "WARN" if COLOURS[state] in (_RED, _AMBER) else "INFO"
+
+
+def _windows(log: FlightLog, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    begins = _begins(log)
+    return [values[begin:end] for begin, end in zip(begins, [*begins[1:], len(values)], strict=True)]
+
+
+def _begins(log: FlightLog) -> list[int]:
+    """The first row of each window; what is left at the end belongs to the last."""
+    rows = max(1, round(WINDOW / log.flight.guidance_period))
+    return list(range(0, max(1, len(log) - rows + 1), rows))
+
+
+def _lane(log: FlightLog, states: Sequence[str]) -> list[Change]:
+    times = log["time"][_begins(log)]
+    return _merged([Change(float(time), state) for time, state in zip(times, states, strict=True)])
+
+
+def _merged(changes: Sequence[Change]) -> list[Change]:
+    return [change for i, change in enumerate(changes) if i == 0 or change.state != changes[i - 1].state]

@@ -1,0 +1,178 @@
+"""The layout of a recording: its tabs, each plot with room for its legend beside the curves."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import rerun.blueprint as rrb
+
+from harness.review.plots import Plot, end
+from harness.review.recorder import Recorder
+from harness.review.scene import chase_view, scene_view
+from harness.review.shown import WORDS, Shown
+
+_RIGHT = 950.0  # points: width of the column of plots in a window 1600 wide
+_HEIGHT = 870.0  # points: height of all tabs in a window 1000 high
+_LANE, _LANES = 38.0, 52.0  # points: height of a lane, and of what is around all of them
+_EVENTS = 190.0  # points: height of the events
+_LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of all else there
+_AXIS = 35.0  # points: width of the numbers beside a plot
+_MOST_WITH_CHASE = 3  # flights
+Tab = rrb.Container | rrb.View
+
+
+class Content(NamedTuple):
+    """All that there is to lay out."""
+
+    flights: Sequence[Shown]
+    overview: Sequence[Plot]
+    differences: Sequence[Plot]
+    aircraft: Sequence[Plot]
+    target: Sequence[Plot]
+    lanes: int
+
+
+def layout(content: Content) -> rrb.Blueprint:
+    """Five tabs; the cursor stands at the start, the panels of the viewer are out of the way."""
+    tabs = [
+        _overview(content),
+        _around_the_cursor(content),
+        _grid(content.aircraft, content, 2 if len(content.flights) == 1 else 3, 1540.0, "Aircraft"),
+        _target(content),
+        rrb.Horizontal(
+            rrb.TextDocumentView(origin="/notes/result", name="Result"),
+            rrb.TextDocumentView(origin="/notes/settings", name="Settings, provenance"),
+            column_shares=(3.0, 2.0),
+            name="Notes",
+        ),
+    ]
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=Recorder.TIMELINE, playback_speed=10.0, play_state="paused"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _overview(content: Content) -> Tab:
+    """Left what the eye follows, right the plots; the modes of many flights are on the left, in the chase's place."""
+    flights, plots = content.flights, {plot.name: plot for plot in content.overview}
+    many = len(flights) > _MOST_WITH_CHASE
+    legends = list(content.overview) if len(flights) == 1 else [plots["range_error"]]
+    gutter = _gutter(legends, _RIGHT)
+    lanes = rrb.StateTimelineView(origin="/lanes", name="Modes", time_view=_whole(flights, 0.02 if many else gutter))
+    lanes_height = _LANES + _LANE * content.lanes
+
+    rows: list[Tab] = [_strip(plot, flights, gutter) for plot in legends]
+    below: list[Tab] = []
+    if len(flights) > 1:
+        title = f"{plots['range_error'].title}; wide and pale: {flights[0].name}, the reference"
+        rows = [_view(plots["range_error"], _whole(flights, gutter), title=title)]
+        rows += [_strip(plots[name], flights, gutter, legend=False) for name in ("heading_rate",) if name in plots]
+        rows += _beside([plots[name] for name in ("bank", "sideslip") if name in plots], flights)
+        below = _beside(content.differences, flights)
+    weights = [max(1.0, 0.31 * _entries(plot)) for plot in legends]
+    weights += [1.0] * (len(rows) + len(below) - len(weights))
+    room = _HEIGHT - (0.0 if many else lanes_height)
+    shares = [room * weight / sum(weights) for weight in weights]
+    if not many:
+        shares.insert(len(rows), lanes_height)
+        rows.append(lanes)
+    right = rrb.Vertical(*rows, *below, row_shares=shares)
+
+    middle = lanes if many else chase_view(flights[-1], flights)
+    middle_height = lanes_height if many else 250.0
+    left_shares = (_HEIGHT - middle_height - _EVENTS, middle_height, _EVENTS)
+    left = rrb.Vertical(scene_view(flights, 1.45), middle, _event_view(), row_shares=left_shares)
+    return rrb.Horizontal(left, right, column_shares=(2.0, 3.0), name="Overview")
+
+
+def _around_the_cursor(content: Content) -> Tab:
+    flights = content.flights
+    left = rrb.Vertical(chase_view(flights[-1], flights), scene_view(flights, 1.8), row_shares=(3.0, 2.0))
+    axis = rrb.TimeAxis(link="LinkToGlobal")  # Rerun shows 30 s to either side, whatever range is asked for
+    right = [
+        _view(
+            plot,
+            axis,
+            title=_coloured(plot, flights),
+            legend=False,
+            near=plot.name in ("range_error", "sliding_variable"),
+        )
+        for plot in content.overview
+    ]
+    return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=(2.0, 3.0), name="Around the cursor, ±30 s")
+
+
+def _event_view() -> rrb.View:
+    columns = rrb.TextLogColumns(timeline_columns=[Recorder.TIMELINE], text_log_columns=["Body"])
+    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+
+
+def _target(content: Content) -> Tab:
+    believed, *plots = sorted(content.target, key=lambda plot: plot.name != "range_error_seen")
+    if believed.name != "range_error_seen":
+        left: Tab = scene_view(content.flights, 0.6, "Target and circle")
+        plots = [believed, *plots]
+    else:
+        below = _strip(believed, content.flights, _gutter([believed], 530.0))
+        left = rrb.Vertical(scene_view(content.flights, 0.95, "Target and circle"), below, row_shares=(2.0, 1.0))
+    right = _grid(plots, content, 2, 1060.0)
+    return rrb.Horizontal(left, right, column_shares=(1.0, 2.0), name="Target")
+
+
+def _grid(
+    plots: Sequence[Plot], content: Content, columns: int, width: float, name: str | None = None
+) -> rrb.Container:
+    """In rows of `columns`; with a legend where its names say more than the flights' colours."""
+    legend = len(content.flights) == 1 or plots is not content.aircraft
+    gutter = _gutter(plots, width / columns) if legend else 0.02
+    views = [_strip(plot, content.flights, gutter, legend=legend) for plot in plots]
+    return rrb.Grid(*views, grid_columns=columns, name=name)
+
+
+def _beside(plots: Sequence[Plot], flights: Sequence[Shown]) -> list[Tab]:
+    views = [_strip(plot, flights, 0.02, legend=False) for plot in plots]
+    return [rrb.Horizontal(*views[i : i + 2]) for i in range(0, len(views), 2)]
+
+
+def _strip(plot: Plot, flights: Sequence[Shown], gutter: float, *, legend: bool = True) -> rrb.View:
+    return _view(plot, _whole(flights, gutter), legend=legend, title=plot.title)
+
+
+def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, near: bool = False) -> rrb.View:
+    """`near`: the values of the times shown fill the plot."""
+    return rrb.TimeSeriesView(
+        origin=f"/plots/{plot.name}",
+        name=title,
+        axis_x=axis,
+        axis_y=None if near else rrb.ScalarAxis(range=plot.span),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
+    )
+
+
+def _whole(flights: Sequence[Shown], gutter: float) -> rrb.TimeAxis:
+    """The whole flight, and beside it a share of the width for the legend."""
+    begin, last = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (0.0, end(flights) / (1.0 - gutter)))
+    return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(begin, last))
+
+
+def _entries(plot: Plot) -> int:
+    """Lines of the legend: names that are the same share one."""
+    return len({name for series in plot.series for name in series.names})
+
+
+def _gutter(plots: Sequence[Plot], width: float) -> float:
+    longest = max((len(name) for plot in plots for series in plot.series for name in series.names), default=0)
+    return min(0.5, (_BESIDE_LETTERS + _LETTER * longest) / (width - _AXIS))
+
+
+def _coloured(plot: Plot, flights: Sequence[Shown]) -> str:
+    """The title with the colours in words: where the curves fill the plot, a legend would lie on them."""
+    if len(flights) == 1:
+        shades = ("dim", "pale", WORDS[flights[0].colour])
+        names = plot.series[-1].names
+        words = [f"{name} {shade}" for name, shade in zip(names, shades[-len(names) :], strict=True)]
+    else:
+        words = [f"{one.name} {WORDS[one.colour]}" for one in flights]
+    return f"{plot.title}: {', '.join(words)}"

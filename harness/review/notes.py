@@ -1,0 +1,74 @@
+"""The words of a recording, in Markdown: results, feasibility, settings, provenance, and the command that made it."""
+
+import json
+import platform
+from collections.abc import Sequence
+
+from harness.commands.telling import feasibility_line, number
+from harness.flight import warnings
+from harness.flight_log import FlightLog
+from harness.key import PHYSICS, flight_key
+from harness.metrics import MEANING, metrics
+from harness.review.shown import Shown
+from harness.runs.provenance import packages
+from harness.runs.results import flat_settings
+from harness.settings import document
+
+
+def result_notes(flights: Sequence[Shown], title: str, above: str, command: str) -> str:
+    """What came out, a column per flight, and how to get it again."""
+    parts = [f"# {title}"]
+    parts += [above] if above else []
+    said: dict[str, list[str]] = {}
+    for one in flights:
+        for line in (feasibility_line(one.log.flight), *(f"warning: {w}" for w in warnings(one.log.flight))):
+            said.setdefault(line, []).append(one.name)
+    of = {line: "" if len(names) == len(flights) else f" ({', '.join(names)})" for line, names in said.items()}
+    parts.append("\n".join(f"- {line}{of[line]}" for line in said))
+    judged = [metrics(one.log) for one in flights]
+    wide = len(flights) < 3  # enough room for the meaning
+    ends = [f"{f.log.outcome.value}{': ' if f.log.reason else ''}{f.log.reason}" for f in flights]
+    head = ["metric", *(one.name for one in flights), *(["meaning"] if wide else [])]
+    rows = [["outcome", *ends, *(["how it ended"] if wide else [])]]
+    rows += [[name, *(number(m[name]) for m in judged), *([MEANING[name]] if wide else [])] for name in MEANING]
+    parts.append(_table([head, *rows]))
+    parts += [f"Made by\n\n```\n{command}\n```"] if command else []
+    return "\n\n".join(parts)
+
+
+def settings_notes(flights: Sequence[Shown]) -> str:
+    """Provenance of the recording, the settings of the first flight whole, and of the others what differs."""
+    made_with = {**packages(), "physics": str(PHYSICS), "python": platform.python_version(), "on": platform.platform()}
+    parts = ["## Provenance", _table([["what", "version"], *([name, value] for name, value in made_with.items())])]
+    parts.append(
+        _table([["flight", "key", "digest"], *([f.name, flight_key(f.log.flight), f.log.digest] for f in flights)])
+    )
+    first = flat_settings(document(flights[0].log.flight))
+    for one in flights[1:]:
+        other = flat_settings(document(one.log.flight))
+        differs = [
+            [k, _word(first.get(k)), _word(other.get(k))] for k in {**first, **other} if first.get(k) != other.get(k)
+        ]
+        parts.append(f"## {one.name} beside {flights[0].name}")
+        parts.append(_table([["setting", flights[0].name, one.name], *differs]) if differs else "the same settings")
+    parts += [
+        f"## Settings: {flights[0].name}",
+        _table([["setting", "value"], *([k, _word(v)] for k, v in first.items())]),
+    ]
+    return "\n\n".join(parts)
+
+
+def kept(log: FlightLog) -> str:
+    """The flight without its rows, as JSON: with them it can be read back as it was."""
+    return json.dumps(
+        {"flight": document(log.flight), "outcome": log.outcome.value, "reason": log.reason, "digest": log.digest}
+    )
+
+
+def _word(value: object) -> str:
+    return "-" if value is None else value if isinstance(value, str) else json.dumps(value)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
+    return "\n".join([lines[0], "|" + "---|" * len(rows[0]), *lines[1:]])

@@ -1,0 +1,229 @@
+"""Plots over time: which lines each has, from a flight's log, and the range of values it shows."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.review.shown import GREY, LIGHT, Colour, Shown, mixed
+
+Array = NDArray[np.float64]
+
+DEG = 180.0 / math.pi
+_DIM: Colour = (85, 115, 165)
+MOST_WITH_COMMANDS = 2  # flights; of more, the commands would hide what was flown
+
+
+class Series(NamedTuple):
+    """Lines that share their times, the first drawn undermost: one entity of the recording. In the plot's unit."""
+
+    names: tuple[str, ...]
+    colours: tuple[Colour, ...]
+    widths: tuple[float, ...]
+    time: Array
+    values: Array  # (times, lines)
+    variances: Array | None = None  # as `values`: a band of one standard deviation to either side
+
+
+class Plot(NamedTuple):
+    """What there is to draw in one plot, from below to above."""
+
+    name: str
+    title: str
+    series: list[Series]
+    span: tuple[float, float]  # the values shown
+
+
+class _Line(NamedTuple):
+    """A column of the log, as its plot's legend calls it where one flight is shown."""
+
+    column: str
+    label: str
+
+
+class _Content(NamedTuple):
+    """What a plot shows of each flight; one SI unit is `scale` of the plot's."""
+
+    name: str
+    title: str
+    unit: str
+    scale: float
+    lines: tuple[_Line, ...]
+    least: float = 0.1  # of the unit: the smallest span of values that is shown
+
+
+_OVERVIEW = (
+    _Content("range_error", "Range error", "m", 1.0, (_Line("range_error", "flown"),)),
+    _Content(
+        "heading_rate",
+        "Heading rate",
+        "deg/s",
+        DEG,
+        (
+            _Line("unlimited_command", "law's command"),
+            _Line("heading_rate_command", "limited"),
+            _Line("heading_rate", "flown"),
+        ),
+    ),
+    _Content("bank", "Bank", "deg", DEG, (_Line("bank_command", "commanded"), _Line("bank", "flown"))),
+    _Content("sideslip", "Sideslip", "deg", DEG, (_Line("sideslip", "flown"),)),
+    _Content("sliding_variable", "Sliding variable s", "rad", 1.0, (_Line("sliding_variable", "s"),)),
+)
+_AIRCRAFT = (
+    _Content("airspeed", "Airspeed", "m/s", 1.0, (_Line("airspeed", "flown"),), 0.5),
+    _Content("altitude", "Altitude", "m", 1.0, (_Line("altitude", "flown"),), 2.0),
+    _Content(
+        "attack", "Angle of attack, pitch", "deg", DEG, (_Line("pitch", "pitch"), _Line("angle_of_attack", "attack"))
+    ),
+    _Content("load", "Load factor", "g", 1.0, (_Line("load_factor", "n_z"),)),
+    _Content("lateral", "Lateral specific force", "m/s2", 1.0, (_Line("lateral_acceleration", "along the wing"),)),
+    _Content("throttle", "Throttle", "%", 100.0, (_Line("throttle", "throttle"),), 5.0),
+    _Content("aileron", "Aileron", "deg", DEG, (_Line("aileron", "right roll +"),)),
+    _Content("elevator", "Elevator", "deg", DEG, (_Line("elevator", "nose down +"),)),
+    _Content("rudder", "Rudder", "deg", DEG, (_Line("rudder", "nose left +"),)),
+    _Content(
+        "wind",
+        "Wind at the aircraft, towards",
+        "m/s",
+        1.0,
+        (_Line("wind_down", "down"), _Line("wind_east", "east"), _Line("wind_north", "north")),
+    ),
+)
+_SHADES: tuple[tuple[Colour, float], ...] = ((LIGHT, 0.0), (LIGHT, 0.65), (_DIM, 0.8))  # of a flight's lines
+
+
+def overview_plots(flights: Sequence[Shown]) -> list[Plot]:
+    """What the law does and what the aircraft makes of it. A column that a plant has not is left out."""
+    return [plot for content in _OVERVIEW if (plot := _plot(content, flights))]
+
+
+def aircraft_plots(flights: Sequence[Shown]) -> list[Plot]:
+    """The aircraft itself and the air around it; of several flights each line has its own plot, unless it is zero."""
+    if len(flights) == 1:
+        return [plot for content in _AIRCRAFT if (plot := _plot(content, flights))]
+    parts = [part for content in _AIRCRAFT for part in _split(content)]
+    plots = [plot for part in parts if (plot := _plot(part, flights))]
+    return [plot for plot in plots if any(np.nan_to_num(series.values).any() for series in plot.series)]
+
+
+def end(flights: Sequence[Shown]) -> float:
+    """The time of the last row, s; above zero."""
+    return max((float(one.log["time"][-1]) for one in flights if len(one.log)), default=0.0) or 1.0
+
+
+def level(label: str, values: Sequence[float], until: float, colour: Colour = GREY) -> Series:
+    """Horizontal lines over the whole flight under one legend."""
+    one = np.array([values, values])
+    return Series((label,) * len(values), (colour,) * len(values), (1.0,) * len(values), np.array((0.0, until)), one)
+
+
+def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
+    """All values with a margin, at least `least` wide, and with two numbers on the axis.
+
+    Rerun labels powers of ten, and their multiples where there is room: for about seven in our plots.
+    """
+    low, high = _extent(series)
+    if not high - low >= least:
+        low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
+    margin = 0.08 * (high - low)
+    low, high = low - margin, high + margin
+    step = 10.0 ** math.floor(math.log10(high - low))
+    if high - low > 7.0 * step:
+        step *= 10.0
+    first, last = math.ceil(low / step), math.floor(high / step)
+    if first > last:  # no number: both neighbours
+        return last * step - margin, first * step + margin
+    if first == last:  # one: the neighbour that is nearer
+        below, above = low - (first - 1) * step, (last + 1) * step - high
+        return (low, high + above + margin) if above < below else (low - below - margin, high)
+    return low, high
+
+
+def finite(series: Series) -> Series | None:
+    """The lines that have values; None when none has."""
+    drawn = np.isfinite(series.values).any(axis=0)
+    if not drawn.any():
+        return None
+    kept = np.flatnonzero(drawn).tolist()
+    return Series(
+        tuple(series.names[i] for i in kept),
+        tuple(series.colours[i] for i in kept),
+        tuple(series.widths[i] for i in kept),
+        series.time,
+        series.values[:, kept],
+        None if series.variances is None else series.variances[:, kept],
+    )
+
+
+def _split(content: _Content) -> list[_Content]:
+    if len(content.lines) == 1:
+        return [content]
+    return [
+        content._replace(name=line.column, title=line.column.replace("_", " ").capitalize(), lines=(line,))
+        for line in content.lines
+    ]
+
+
+def _plot(content: _Content, flights: Sequence[Shown]) -> Plot | None:
+    flown = [kept for one in flights if (kept := finite(_series(content, one, len(flights))))]
+    if not flown:
+        return None
+    series = [*_bounds(content.name, flights), *flown]
+    return Plot(content.name, f"{content.title} [{content.unit}]", series, _span(content, series, flights))
+
+
+def _series(content: _Content, one: Shown, flights: int) -> Series:
+    lines = content.lines if flights == 1 else content.lines[-2 if flights <= MOST_WITH_COMMANDS else -1 :]
+    names = [line.label if flights == 1 else _name(one.name, line, lines) for line in lines]
+    shades = reversed(_SHADES[: len(lines)])
+    colours = tuple(mixed(one.colour, *shade) for shade in shades)
+    widths = (*[1.0 if one.width < 2.0 else 2.0] * (len(lines) - 1), one.width)
+    values = content.scale * np.column_stack([one.log[line.column] for line in lines])
+    return Series(tuple(names), colours, widths, one.log["time"], values)
+
+
+def _name(flight: str, line: _Line, lines: Sequence[_Line]) -> str:
+    return flight if line is lines[-1] else f"{flight} {line.label}"
+
+
+def _bounds(name: str, flights: Sequence[Shown]) -> list[Series]:
+    """What the values are to be compared with, where it is the same at all times."""
+    several = [one.log.flight for one in flights]
+    if name == "range_error":
+        label, unit, both, values = "tolerance", "m", True, {f.metrics.tolerance for f in several}
+    elif name == "heading_rate":
+        label, unit, both, values = "limit", "deg/s", True, {DEG * f.law.max_heading_rate for f in several}
+    elif name == "airspeed":
+        label, unit, both, values = "nominal", "m/s", False, {f.start.airspeed for f in several}
+    elif name == "altitude":
+        label, unit, both, values = "commanded", "m", False, {f.start.altitude for f in several}
+    else:
+        return []
+    until = end(flights)
+    return [
+        level(f"{label} {'±' if both else ''}{value:.3g} {unit}", (-value, value) if both else (value,), until)
+        for value in sorted(values)
+        if math.isfinite(value)
+    ]
+
+
+def _span(content: _Content, series: Sequence[Series], flights: Sequence[Shown]) -> tuple[float, float]:
+    """All of a curve, but of the range error before half-time what is near, and of heading rates the limit's."""
+    if content.name == "range_error":
+        near = max(0.5 * one.log.flight.law.standoff for one in flights)
+        clipped = [
+            s._replace(values=np.vstack([s.values.clip(-near, near), s.values[len(s.values) // 2 :]])) for s in series
+        ]
+        return span(clipped)
+    limit = DEG * max(one.log.flight.law.max_heading_rate for one in flights)
+    if content.name == "heading_rate" and math.isfinite(limit):
+        return -1.3 * limit, 1.3 * limit
+    return span(series, content.least)
+
+
+def _extent(series: Sequence[Series]) -> tuple[float, float]:
+    values = np.concatenate([s.values.ravel() for s in series])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)

@@ -1,0 +1,93 @@
+"""Reading a recording back: the log of each flight to the last bit, and the flight that it was."""
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rerun.chunk import RrdReader
+
+from harness.flight_log import COLUMNS, FlightLog
+from harness.plant import Outcome
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+class _Held(NamedTuple):
+    """What a file holds of one flight."""
+
+    columns: list[str]
+    table: Array
+    flight: str  # JSON
+
+
+def read_recording(path: Path, flight: str | None = None) -> "pd.DataFrame":
+    """The log of a recorded flight, bit for bit: SI, rad, NED. `flight` names it where the file holds several.
+
+    OSError when the file cannot be read, ValueError when there is no such flight in it.
+    """
+    import pandas as pd
+
+    held = _read(path)
+    one = held[_chosen(path, list(held), flight)]
+    return pd.DataFrame(one.table, columns=one.columns)
+
+
+def read_logs(path: Path) -> dict[str, FlightLog]:
+    """The flights of a recording as they were when it was written. Errors as `read_recording`."""
+    from harness.settings import SettingsError, flight_from_document
+
+    logs = {}
+    for name, (columns, table, flight) in _read(path).items():
+        if tuple(columns) != COLUMNS or not flight:
+            raise ValueError(f"{path}: {name} was recorded by another version, with other columns")
+        known = json.loads(flight)
+        try:
+            settings = flight_from_document(known["flight"])
+        except SettingsError as error:
+            raise ValueError(f"{path}: {name}: {error}") from error
+        logs[name] = FlightLog(settings, Outcome(known["outcome"]), known["reason"], table)
+    return logs
+
+
+def _chosen(path: Path, names: list[str], flight: str | None) -> str:
+    held = ", ".join(sorted(names)) or "none"
+    name = flight if flight is not None else held
+    if name not in names:
+        raise ValueError(f"{path}: {f'no flight {flight!r}' if flight else 'which flight?'} It holds {held}")
+    return name
+
+
+def _read(path: Path) -> dict[str, _Held]:
+    path.open("rb").close()  # for the OSError: Rerun raises RuntimeError for all that is wrong with a file
+    try:
+        chunks = RrdReader(path).stream().filter(content="/runs/**").to_chunks()
+    except RuntimeError as error:
+        raise ValueError(f"{path} is no whole recording: {error}") from error
+    columns: dict[str, list[str]] = {}
+    rows: dict[str, list[Array]] = {}
+    flights: dict[str, str] = {}
+    for chunk in chunks:
+        found = re.fullmatch(r"/runs/((?:[^/\\]|\\.)+)/(log|flight)", chunk.entity_path)
+        if not found:
+            continue
+        name, batch = re.sub(r"\\(.)", r"\1", found[1]), chunk.to_record_batch()
+        if found[2] == "flight":
+            (flights[name],) = batch.column("TextDocument:text").flatten().to_pylist()
+        elif chunk.is_static:
+            columns[name] = batch.column("SeriesLines:names").flatten().to_pylist()
+        else:
+            rows.setdefault(name, []).append(batch.column("Scalars:scalars").flatten().to_numpy())
+    return {
+        name: _Held(
+            names,
+            np.concatenate([np.empty(0), *rows.get(name, [])]).reshape(-1, len(names)),
+            flights.get(name, ""),
+        )
+        for name, names in columns.items()
+    }

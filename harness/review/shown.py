@@ -1,0 +1,66 @@
+"""A flight as it is shown: one name, one colour and one width of line, everywhere."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from harness.flight_log import FlightLog
+
+Colour = tuple[int, int, int]
+
+MOST = 6  # flights in one recording; of more, no eye tells the colours apart
+
+GREY: Colour = (125, 125, 125)
+LIGHT: Colour = (225, 225, 225)
+TARGET: Colour = (235, 75, 85)
+WIND: Colour = (220, 220, 220)
+ESTIMATE: Colour = (240, 200, 70)
+
+_PALE_BLUE: Colour = (125, 165, 215)
+_ORANGE: Colour = (255, 150, 40)
+_GREEN: Colour = (100, 215, 110)
+_MAGENTA: Colour = (230, 110, 230)
+_YELLOW: Colour = (240, 220, 80)
+_CYAN: Colour = (90, 225, 235)
+_PALETTE = (_PALE_BLUE, _ORANGE, _GREEN, _MAGENTA, _YELLOW, _CYAN)
+_PLANTS: Mapping[str, Colour] = MappingProxyType(
+    {"kinematic": _PALE_BLUE, "lagged": _GREEN, "coordinated": _MAGENTA, "sixdof": _ORANGE}
+)
+WORDS: Mapping[Colour, str] = MappingProxyType(
+    {
+        _PALE_BLUE: "pale blue",
+        _ORANGE: "orange",
+        _GREEN: "green",
+        _MAGENTA: "magenta",
+        _YELLOW: "yellow",
+        _CYAN: "cyan",
+    }
+)
+_WIDE, _THIN = 3.5, 1.5  # points on the screen
+
+
+class Shown(NamedTuple):
+    """A flight and its looks; the first of several is the reference, drawn wide and pale under the others."""
+
+    name: str
+    log: FlightLog
+    colour: Colour
+    width: float
+
+
+def shown(logs: Mapping[str, FlightLog]) -> list[Shown]:
+    """Flights by name with their looks: a plant keeps its colour where it appears once. ValueError beyond `MOST`."""
+    if not 1 <= len(logs) <= MOST:
+        raise ValueError(f"{len(logs)} flights: a recording shows 1 to {MOST}")
+    plants = [log.flight.plant for log in logs.values()]
+    colours = [_PLANTS.get(plant, _YELLOW) for plant in plants]
+    if len(set(colours)) < len(colours):
+        colours = list(_PALETTE[: len(colours)])
+    widths = [_WIDE if len(logs) > 1 else _THIN, *[_THIN] * (len(logs) - 1)]
+    return [Shown(*one) for one in zip(logs, logs.values(), colours, widths, strict=True)]
+
+
+def mixed(colour: Colour, other: Colour, share: float) -> Colour:
+    """`colour` with a `share` of another."""
+    r, g, b = (round((1.0 - share) * x + share * y) for x, y in zip(colour, other, strict=True))
+    return r, g, b

@@ -1,0 +1,106 @@
+"""The target over time: the estimate against the truth with its standard deviation, and the innovations."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.review.plots import DEG, Array, Plot, Series, end, finite, level, span
+from harness.review.shown import ESTIMATE, GREY, TARGET, Shown
+
+_BANDS = 2  # flights with bands; of more, they would hide each other
+_AXES = ("north", "east")
+
+
+def target_plots(flights: Sequence[Shown]) -> list[Plot]:
+    """Position and velocity of the target; where a flight estimates them, also the errors and the innovations."""
+    estimating = [one for one in flights if one.log.flight.estimator.kind == "ekf" and len(one.log)]
+    plots = []
+    if estimating:
+        plots += [_position_error(axis, estimating, flights) for axis in _AXES]
+    else:
+        plots += [_plot(f"target_{axis}", f"Target {axis} [m]", [_truth(f"target_{axis}", flights)]) for axis in _AXES]
+    plots += [_velocity(axis, estimating, flights) for axis in _AXES]
+    if estimating:
+        plots += [
+            _innovation("range", "m", 1.0, estimating, flights),
+            _innovation("azimuth", "deg", DEG, estimating, flights),
+            _range_error_seen(estimating, flights),
+        ]
+    return [plot for plot in plots if plot.series]
+
+
+def _plot(name: str, title: str, series: list[Series]) -> Plot:
+    return Plot(name, title, series, span([_near(s) for s in series]))
+
+
+def _position_error(axis: str, estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+    name = f"target_{axis}"
+    series = [level("0", (0.0,), end(flights))]
+    for one in estimating:
+        error = one.log[f"{name}_seen"] - one.log[name]
+        series.append(_estimate(one, error, one.log[f"{name}_variance"], "error", flights))
+    return _plot(f"{name}_error", f"Target {axis}: error of the estimate ± 1σ [m]", series)
+
+
+def _velocity(axis: str, estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+    name = f"target_velocity_{axis}"
+    series = [
+        _estimate(one, one.log[f"{name}_seen"], one.log[f"{name}_variance"], "estimate", flights) for one in estimating
+    ]
+    band = ": estimate ± 1σ and truth" if estimating else ""
+    return _plot(name, f"Target velocity {axis}{band} [m/s]", [*series, _truth(name, flights)])
+
+
+def _innovation(of: str, unit: str, scale: float, estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+    series = [level("0", (0.0,), end(flights))]
+    for one in estimating:
+        values = scale * one.log[f"innovation_{of}"]
+        new = np.isfinite(values)
+        colour, label = _looks(one, "innovation", flights)
+        series.append(Series((label,), (colour,), (1.0,), one.log["time"][new], values[new, np.newaxis]))
+    return _plot(f"innovation_{of}", f"Innovation, {of} [{unit}]", [kept for s in series if (kept := finite(s))])
+
+
+def _range_error_seen(estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+    """What the law believed: its range error from the estimate."""
+    series = []
+    for one in estimating:
+        colour, name = _looks(one, "seen by the law", flights)
+        names = (name,) if len(flights) > 1 else ("true", name)
+        columns = ("range_error_seen",) if len(flights) > 1 else ("range_error", "range_error_seen")
+        values = np.column_stack([one.log[column] for column in columns])
+        colours = (TARGET, colour)[-len(names) :]
+        series.append(Series(names, colours, (one.width,) * len(names), one.log["time"], values))
+    title = (
+        "Range error, true and as the law sees it [m]" if len(flights) == 1 else "Range error as the law sees it [m]"
+    )
+    return Plot(
+        "range_error_seen", title, series, span([s._replace(values=s.values[len(s.values) // 10 :]) for s in series])
+    )
+
+
+def _estimate(one: Shown, values: Array, variances: Array, label: str, flights: Sequence[Shown]) -> Series:
+    colour, name = _looks(one, label, flights)
+    bands = variances[:, np.newaxis] if len(flights) <= _BANDS else None
+    return Series((name,), (colour,), (one.width,), one.log["time"], values[:, np.newaxis], bands)
+
+
+def _truth(column: str, flights: Sequence[Shown]) -> Series:
+    """The target moves alike in all flights of a comparison; drawn is the longest."""
+    longest = max(flights, key=lambda one: len(one.log)).log
+    return Series(("truth",), (TARGET,), (1.5,), longest["time"], longest[column][:, np.newaxis])
+
+
+def _looks(one: Shown, label: str, flights: Sequence[Shown]) -> tuple[tuple[int, int, int], str]:
+    return (ESTIMATE, label) if len(flights) == 1 else (one.colour, one.name)
+
+
+def _near(series: Series) -> Series:
+    """The values with most of their bands: what counts is seen, though a filter starts from far off."""
+    values = series.values
+    if series.colours[0] in (TARGET, GREY) or not len(values):
+        return series
+    around = np.sqrt(series.variances) if series.variances is not None else 0.0
+    later = np.vstack([values - around, values + around])
+    low, high = np.nanpercentile(later, (2.0, 98.0), axis=0)
+    return series._replace(values=np.vstack([low, high]))
