@@ -8,6 +8,7 @@ from harness.commands.check import check
 from harness.commands.compare import compare
 from harness.commands.demo import demo
 from harness.commands.doctor import doctor
+from harness.commands.export import export
 from harness.commands.fly import fly
 from harness.commands.identify import identify
 from harness.commands.list import list_
@@ -15,6 +16,7 @@ from harness.commands.report import report
 from harness.commands.reproduce import reproduce
 from harness.commands.run import run
 from harness.commands.show import show
+from harness.commands.view import view
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -28,7 +30,9 @@ def harness() -> None:
     """
 
 
-for command in (fly, run, show, compare, report, check, list_, demo, reproduce, identify, doctor):
+for command in (
+    fly, run, show, view, export, compare, report, check, list_, demo, reproduce, identify, doctor
+):
     harness.add_command(command)
 
 

@@ -1,6 +1,7 @@
 """The one loop: target, sensor, estimator, observation, guidance law, plant."""
 
 import math
+from collections.abc import Callable
 from struct import Struct
 
 import numpy as np
@@ -17,8 +18,14 @@ _OWN = Observation._fields.index("nominal_airspeed")  # the first fields of both
 assert State._fields[:_OWN] == Observation._fields[:_OWN]
 
 
-def simulate(flight: Flight) -> FlightLog:
-    """Flies the flight: once started it always ends in a log. ValueError, or `PlantError`, when it cannot."""
+Watch = Callable[[float, Callable[[], FlightLog]], None]  # gets the time, s, and how to ask for the log so far
+
+
+def simulate(flight: Flight, watch: Watch | None = None) -> FlightLog:
+    """Flies the flight: once started it always ends in a log. ValueError, or `PlantError`, when it cannot.
+
+    `watch` is called after each row; it may take its time.
+    """
     for problem in problems(flight):
         raise ValueError(f"{problem.name}: {problem.message}")
     target, law = flight.target.start(), flight.law.start()
@@ -30,6 +37,11 @@ def simulate(flight: Flight) -> FlightLog:
     row, stride = Struct(f"{len(LOOP_COLUMNS)}d"), 8 * len(COLUMNS)
     table, rows = bytearray((last + 1) * stride), 0
     outcome, reason = Outcome.COMPLETED, ""
+
+    def so_far() -> FlightLog:
+        log = FlightLog(flight, outcome, reason, np.frombuffer(table).reshape(-1, len(COLUMNS))[:rows])
+        return completed(log, estimation.rows[:rows] if estimation else None)
+
     try:
         for k in range(last + 1):
             state, truth = flying.state, target(k * period)
@@ -37,14 +49,15 @@ def simulate(flight: Flight) -> FlightLog:
             guidance = command(law, observe(state, nominal_airspeed, wind, seen))
             row.pack_into(table, rows * stride, k * period, *state, *truth, *guidance)
             rows += 1
+            if watch:
+                watch(k * period, so_far)
             if monitoring_range and math.dist(state[:2], truth[:2]) > monitoring_range:
                 raise End(Outcome.TARGET_LOST, f"beyond the monitoring range, {monitoring_range:g} m")
             if k < last:
                 flying.advance(guidance.heading_rate, period)
     except End as end:
         outcome, reason = end.outcome, str(end)
-    log = FlightLog(flight, outcome, reason, np.frombuffer(table).reshape(-1, len(COLUMNS))[:rows])
-    return completed(log, estimation.rows[:rows] if estimation else None)
+    return so_far()
 
 
 def completed(log: FlightLog, estimates: list[tuple[float, ...]] | None) -> FlightLog:

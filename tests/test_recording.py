@@ -18,7 +18,8 @@ from autopilot.laws import law
 from harness.flight import Flight, MetricSettings
 from harness.flight_log import COLUMNS, FlightLog
 from harness.plant import Outcome
-from harness.review.recording import read_recording, write_recording
+from harness.review.reading import read_recording
+from harness.review.recording import write_recording
 from harness.simulation import simulate
 from harness.wind import Wind
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from harness.review.live import Live
     from harness.runs.recall import Place, Recalled
     from harness.runs.row import Judged
 
@@ -17,8 +18,19 @@ if TYPE_CHECKING:
 @click.argument("what", metavar="FILE|DIR:KEY")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
 @click.option("--rrd", type=click.Path(path_type=Path), help="Write a Rerun recording there.")
+@click.option("--live", is_flag=True, help="Stream to an open viewer (`harness view`) while flying.")
+@click.option("--pace", type=click.FloatRange(0, min_open=True), help="Times real time, with --live.  [default: 1]")
+@click.option("--port", type=click.IntRange(1, 65535), help="Where the viewer listens, with --live.  [default: 9876]")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout instead of the table.")
-def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) -> None:
+def fly(
+    what: str,
+    overrides: tuple[str, ...],
+    rrd: Path | None,
+    live: bool,
+    pace: float | None,
+    port: int | None,
+    as_json: bool,
+) -> None:
     """Fly the flight that FILE describes, or again a row of a run, and print its metrics.
 
     A row without --set is compared with what is stored. The beginning of its key is enough.
@@ -27,6 +39,7 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     Examples:
       harness fly experiments/stationary.toml --rrd flight.rrd
       harness fly experiments/stationary.toml --set plant=kinematic --set law.name=smc --set law.gains=paper --json
+      harness fly experiments/stationary.toml --live --pace 10
       harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0]
     """
     import json
@@ -39,6 +52,8 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     from harness.runs.row import judged, row
     from harness.simulation import simulate
 
+    if not live and (pace is not None or port is not None):
+        raise BadInput("--pace and --port are of --live: add it")
     place = place_of(what)
     recalled = _recalled(place) if place else None
     settings = recalled.file(what, overrides) if recalled else read_file(Path(what), overrides)
@@ -48,7 +63,12 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     click.echo(feasibility_line(flight), err=as_json)
     for warning in warnings(flight):
         click.echo(f"warning: {warning}", err=True)
-    log = simulate(flight)
+    stream = _stream(flight.plant, Path(what).stem, pace, port) if live else None
+    log = simulate(flight, stream)
+    if stream:
+        stream.finish(log, typed())
+        if stream.gone:
+            click.echo("warning: the viewer was closed during the flight", err=True)
     how = judged(log)
     result = row(flight, identity(flight), how)
     if recalled and not overrides:
@@ -66,6 +86,18 @@ def fly(what: str, overrides: tuple[str, ...], rrd: Path | None, as_json: bool) 
     else:
         _tell(result, {name: (number(value), MEANING[name]) for name, value in result["metrics"].items()})
     raise SystemExit(1 if log.outcome.failed else 0)
+
+
+def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live:
+    """To the viewer that is open. At once an error when there is none."""
+    from harness.commands.telling import BadInput
+    from harness.review.live import Live
+    from harness.review.viewer import PORT, ViewerError
+
+    try:
+        return Live(name, title, pace or 1.0, port or PORT)
+    except ViewerError as error:
+        raise BadInput(str(error)) from None
 
 
 def _recalled(place: Place) -> Recalled:

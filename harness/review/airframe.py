@@ -16,9 +16,12 @@ _WHITE = (255, 255, 255)
 
 
 def size(flight: Flight) -> tuple[float, float, bool]:
-    """Span and mean chord, m; whether there is a tail."""
-    data = aircraft.data(aircraft.folder(flight.aircraft))
-    return float(data["ref"]["b"]["v"]), float(data["ref"]["c"]["v"]), bool(data["meta"]["has_rudder"])
+    """Span and mean chord, m; whether there is a tail. A small aircraft's where the airframe's files do not say."""
+    try:
+        data = aircraft.data(aircraft.folder(flight.aircraft))
+        return float(data["ref"]["b"]["v"]), float(data["ref"]["c"]["v"]), bool(data["meta"]["has_rudder"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return 1.5, 0.25, True
 
 
 def airframe(flight: Flight, times: float, colour: Colour) -> rr.Mesh3D:

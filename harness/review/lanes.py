@@ -123,10 +123,9 @@ def _aircraft(log: FlightLog) -> list[Change]:
     """Stall and bank limit, as the airframe's own data have them; nothing of a plant without an airframe."""
     if np.isnan(log["angle_of_attack"]).all():
         return []
-    airframe = aircraft.folder(log.flight.aircraft)
-    stall, limit = aircraft.data(airframe)["aero"]["alpha_stall"]["v"], aircraft.bank_limit(airframe)
-    stalled = _windows(log, (log["angle_of_attack"] >= stall).astype(float))
-    banked = _windows(log, (np.abs(log["bank_command"]) >= limit - 1e-9).astype(float))
+    limits = aircraft.limits(aircraft.folder(log.flight.aircraft))
+    stalled = _windows(log, (log["angle_of_attack"] >= limits.stall).astype(float))
+    banked = _windows(log, (np.abs(log["bank_command"]) >= limits.bank - 1e-9).astype(float))
     states = [
         "beyond the stall angle" if s.any() else "bank at its limit" if b.any() else "normal"
         for s, b in zip(stalled, banked, strict=True)

@@ -1,11 +1,11 @@
 """The layout of a recording: its tabs, each plot with room for its legend beside the curves."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import rerun.blueprint as rrb
 
-from harness.review.plots import Plot, end
+from harness.review.plots import Plot
 from harness.review.recorder import Recorder
 from harness.review.scene import chase_view, scene_view
 from harness.review.shown import WORDS, Shown
@@ -17,6 +17,7 @@ _EVENTS = 190.0  # points: height of the events
 _LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of all else there
 _AXIS = 35.0  # points: width of the numbers beside a plot
 _MOST_WITH_CHASE = 3  # flights
+PlayState = Literal["following", "paused"]
 Tab = rrb.Container | rrb.View
 
 
@@ -29,6 +30,8 @@ class Content(NamedTuple):
     aircraft: Sequence[Plot]
     target: Sequence[Plot]
     lanes: int
+    until: float  # s: the time that plots of whole flights end with
+    growing: bool = False  # flights are shown while they are flown: the range of their values is not known yet
 
 
 def layout(content: Content) -> rrb.Blueprint:
@@ -45,9 +48,10 @@ def layout(content: Content) -> rrb.Blueprint:
             name="Notes",
         ),
     ]
+    play: PlayState = "following" if content.growing else "paused"
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
-        rrb.TimePanel(state="collapsed", timeline=Recorder.TIMELINE, playback_speed=10.0, play_state="paused"),
+        rrb.TimePanel(state="collapsed", timeline=Recorder.TIMELINE, playback_speed=10.0, play_state=play),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
@@ -58,19 +62,19 @@ def _overview(content: Content) -> Tab:
     """Left what the eye follows, right the plots; the modes of many flights are on the left, in the chase's place."""
     flights, plots = content.flights, {plot.name: plot for plot in content.overview}
     many = len(flights) > _MOST_WITH_CHASE
-    legends = list(content.overview) if len(flights) == 1 else [plots["range_error"]]
+    legends = [plot for plot in content.overview if len(flights) == 1 or plot.name == "range_error"]
     gutter = _gutter(legends, _RIGHT)
-    lanes = rrb.StateTimelineView(origin="/lanes", name="Modes", time_view=_whole(flights, 0.02 if many else gutter))
+    lanes = rrb.StateTimelineView(origin="/lanes", name="Modes", time_view=_whole(content, 0.02 if many else gutter))
     lanes_height = _LANES + _LANE * content.lanes
 
-    rows: list[Tab] = [_strip(plot, flights, gutter) for plot in legends]
+    rows: list[Tab] = [_strip(plot, content, gutter) for plot in legends]
     below: list[Tab] = []
     if len(flights) > 1:
-        title = f"{plots['range_error'].title}; wide and pale: {flights[0].name}, the reference"
-        rows = [_view(plots["range_error"], _whole(flights, gutter), title=title)]
-        rows += [_strip(plots[name], flights, gutter, legend=False) for name in ("heading_rate",) if name in plots]
-        rows += _beside([plots[name] for name in ("bank", "sideslip") if name in plots], flights)
-        below = _beside(content.differences, flights)
+        reference = f"; wide and pale: {flights[0].name}, the reference"
+        rows = [_strip(plot._replace(title=plot.title + reference), content, gutter) for plot in legends]
+        rows += [_strip(plots[name], content, gutter, legend=False) for name in ("heading_rate",) if name in plots]
+        rows += _beside([plots[name] for name in ("bank", "sideslip") if name in plots], content)
+        below = _beside(content.differences, content)
     weights = [max(1.0, 0.31 * _entries(plot)) for plot in legends]
     weights += [1.0] * (len(rows) + len(below) - len(weights))
     room = _HEIGHT - (0.0 if many else lanes_height)
@@ -115,7 +119,7 @@ def _target(content: Content) -> Tab:
         left: Tab = scene_view(content.flights, 0.6, "Target and circle")
         plots = [believed, *plots]
     else:
-        below = _strip(believed, content.flights, _gutter([believed], 530.0))
+        below = _strip(believed, content, _gutter([believed], 530.0))
         left = rrb.Vertical(scene_view(content.flights, 0.95, "Target and circle"), below, row_shares=(2.0, 1.0))
     right = _grid(plots, content, 2, 1060.0)
     return rrb.Horizontal(left, right, column_shares=(1.0, 2.0), name="Target")
@@ -127,17 +131,18 @@ def _grid(
     """In rows of `columns`; with a legend where its names say more than the flights' colours."""
     legend = len(content.flights) == 1 or plots is not content.aircraft
     gutter = _gutter(plots, width / columns) if legend else 0.02
-    views = [_strip(plot, content.flights, gutter, legend=legend) for plot in plots]
+    views = [_strip(plot, content, gutter, legend=legend) for plot in plots]
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def _beside(plots: Sequence[Plot], flights: Sequence[Shown]) -> list[Tab]:
-    views = [_strip(plot, flights, 0.02, legend=False) for plot in plots]
+def _beside(plots: Sequence[Plot], content: Content) -> list[Tab]:
+    views = [_strip(plot, content, 0.02, legend=False) for plot in plots]
     return [rrb.Horizontal(*views[i : i + 2]) for i in range(0, len(views), 2)]
 
 
-def _strip(plot: Plot, flights: Sequence[Shown], gutter: float, *, legend: bool = True) -> rrb.View:
-    return _view(plot, _whole(flights, gutter), legend=legend, title=plot.title)
+def _strip(plot: Plot, content: Content, gutter: float, *, legend: bool = True) -> rrb.View:
+    near = content.growing and plot.name != "heading_rate"  # whose range is known: the limit's
+    return _view(plot, _whole(content, gutter), legend=legend, title=plot.title, near=near)
 
 
 def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, near: bool = False) -> rrb.View:
@@ -151,9 +156,9 @@ def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, ne
     )
 
 
-def _whole(flights: Sequence[Shown], gutter: float) -> rrb.TimeAxis:
+def _whole(content: Content, gutter: float) -> rrb.TimeAxis:
     """The whole flight, and beside it a share of the width for the legend."""
-    begin, last = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (0.0, end(flights) / (1.0 - gutter)))
+    begin, last = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (0.0, content.until / (1.0 - gutter)))
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(begin, last))
 
 

@@ -13,9 +13,9 @@ from harness.review.differences import difference_plots
 from harness.review.lanes import COLOURS, Change, events, lanes, summary
 from harness.review.layout import Content, layout
 from harness.review.notes import kept, result_notes, settings_notes
-from harness.review.plots import Plot, Series, aircraft_plots, overview_plots
+from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
-from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks
+from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
 from harness.review.shown import Shown, shown
 from harness.review.target_plots import target_plots
 
@@ -50,6 +50,7 @@ def content_of(flights: Sequence[Shown]) -> Content:
         aircraft_plots(flights),
         target_plots(flights),
         len(flights) if several else len(lanes(flights[0].log)),
+        end(flights),
     )
 
 
@@ -137,6 +138,7 @@ def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
         log_rows(to, one.name, one.log)
         log_airframe(to, one, flights)
         log_motion(to, one, one.log)
+        log_trail(to, one, one.log)
     for plot in (*content.overview, *content.differences, *content.aircraft, *content.target):
         log_series(to, plot)
     log_story(to, flights, title, notes, command)

@@ -74,7 +74,7 @@ def log_airframe(to: Recorder, one: Shown, flights: Sequence[Shown]) -> None:
 
 
 def log_motion(to: Recorder, one: Shown, rows: FlightLog) -> None:
-    """The aircraft's pose at each row, level and banked, and its trail in pieces."""
+    """The aircraft's pose at each row: level on its track, and banked within that."""
     entity, time, track = to.flight(one.name), rows["time"], _track(rows)
     yaw = np.where(np.isnan(rows["yaw"]), rows["heading"], rows["yaw"])  # without a nose, along its heading
     level = Rotation.from_euler("Z", yaw[:, np.newaxis]).as_quat()
@@ -83,12 +83,19 @@ def log_motion(to: Recorder, one: Shown, rows: FlightLog) -> None:
     if not np.isnan(rows["bank"]).all():
         banked = Rotation.from_euler("YX", attitude).as_quat()
         to.columns(f"{entity}/vehicle/body", time, rr.Transform3D.columns(quaternion=banked))
+
+
+def log_trail(to: Recorder, one: Shown, rows: FlightLog) -> int:
+    """The way behind the aircraft in whole pieces of a second; gives the row that the last of them ends at."""
     piece = max(1, round(_STRIP / rows.flight.guidance_period))
     ends = np.arange(piece, len(rows), piece)
-    if len(ends):
-        strips = [track[end - piece : end + 1] + _below(one) for end in ends]
-        to.once(f"{entity}/trail", rr.LineStrips3D.from_fields(colors=one.colour, radii=-_trail_radius(one)))
-        to.columns(f"{entity}/trail", time[ends], rr.LineStrips3D.columns(strips=strips))
+    if not len(ends):
+        return 0
+    entity, track = f"{to.flight(one.name)}/trail", _track(rows)
+    strips = [track[end - piece : end + 1] + _below(one) for end in ends]
+    to.once(entity, rr.LineStrips3D.from_fields(colors=one.colour, radii=-_trail_radius(one)))
+    to.columns(entity, rows["time"][ends], rr.LineStrips3D.columns(strips=strips))
+    return int(ends[-1])
 
 
 def scene_view(flights: Sequence[Shown], aspect: float, name: str = "Scene") -> rrb.Spatial3DView:

@@ -245,6 +245,18 @@ def last_run(folder: Path) -> Mapping[str, Any]:
     return dict(found)
 
 
+def on_each_plant(folder: Path, settings: Mapping[str, Any]) -> dict[str, str]:
+    """The keys of the rows whose settings differ from these in the plant alone, by plant; the latest of each."""
+    with reading(folder) as journal:
+        return dict(
+            journal.execute(
+                "SELECT json_extract(settings, '$.plant'), key FROM flights "
+                "WHERE json_remove(settings, '$.plant') = json_remove(?, '$.plant') ORDER BY rowid",
+                (json.dumps(settings),),
+            ).fetchall()
+        )
+
+
 def content(folder: Path, digest: str) -> bytes:
     """A file that a flight read, by its hash. Raises `StoreError`."""
     with reading(folder) as journal:

@@ -88,7 +88,7 @@ def fly_task(task: Task, folder: Path) -> Flown:
     if task.record == "all" or (task.record == "failed" and log.outcome is not Outcome.COMPLETED):
         from harness.runs.recordings import record
 
-        problem = record(log, how, task.key, folder)
+        problem = record(log, task.key, folder)
     return Flown(how, hashed(version_of(task.flight)), problem)
 
 
