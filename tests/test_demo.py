@@ -8,7 +8,7 @@ from harness import demo
 from harness.commands.telling import number
 from harness.flight_log import COLUMNS
 from harness.plant import Outcome
-from harness.review.recording import read_recording
+from harness.review.reading import read_recording
 
 Flights = list[demo.Flown]
 

@@ -60,10 +60,10 @@ def fly(
     flight = flight_of(settings)
     if rrd is not None:
         writable(rrd)
+    stream = _stream(flight.plant, Path(what).stem, pace, port) if live else None
     click.echo(feasibility_line(flight), err=as_json)
     for warning in warnings(flight):
         click.echo(f"warning: {warning}", err=True)
-    stream = _stream(flight.plant, Path(what).stem, pace, port) if live else None
     log = simulate(flight, stream)
     if stream:
         stream.finish(log, typed())

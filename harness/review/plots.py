@@ -219,7 +219,9 @@ def _span(content: _Content, series: Sequence[Series], flights: Sequence[Shown])
         return span(clipped)
     limit = DEG * max(one.log.flight.law.max_heading_rate for one in flights)
     if content.name == "heading_rate" and math.isfinite(limit):
-        return -1.3 * limit, 1.3 * limit
+        ten = 10.0 ** math.ceil(math.log10(limit))
+        high = max(1.3 * limit, 1.04 * ten if ten <= 2.0 * limit else 0.0)  # with a number on the axis, if near
+        return -high, high
     return span(series, content.least)
 
 
