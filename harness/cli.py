@@ -30,9 +30,7 @@ def harness() -> None:
     """
 
 
-for command in (
-    fly, run, show, view, export, compare, report, check, list_, demo, reproduce, identify, doctor
-):
+for command in (fly, run, show, view, export, compare, report, check, list_, demo, reproduce, identify, doctor):
     harness.add_command(command)
 
 
