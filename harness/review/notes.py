@@ -58,10 +58,10 @@ def settings_notes(flights: Sequence[Shown]) -> str:
     return "\n\n".join(parts)
 
 
-def kept(log: FlightLog) -> str:
-    """The flight without its rows, as JSON: with them it can be read back as it was."""
+def kept(log: FlightLog, place: int) -> str:
+    """The flight without its rows, as JSON: with them it can be read back as it was, and at its place among others."""
     return json.dumps(
-        {"flight": document(log.flight), "outcome": log.outcome.value, "reason": log.reason, "digest": log.digest}
+        {"place": place, "flight": document(log.flight), "outcome": log.outcome.value, "reason": log.reason}
     )
 
 

@@ -39,10 +39,10 @@ def read_recording(path: Path, flight: str | None = None) -> "pd.DataFrame":
 
 
 def read_logs(path: Path) -> dict[str, FlightLog]:
-    """The flights of a recording as they were when it was written. Errors as `read_recording`."""
+    """The flights of a recording as they were when it was written, in its order. Errors as `read_recording`."""
     from harness.settings import SettingsError, flight_from_document
 
-    logs = {}
+    logs, places = {}, {}
     for name, (columns, table, flight) in _read(path).items():
         if tuple(columns) != COLUMNS or not flight:
             raise ValueError(f"{path}: {name} was recorded by another version, with other columns")
@@ -52,7 +52,8 @@ def read_logs(path: Path) -> dict[str, FlightLog]:
         except SettingsError as error:
             raise ValueError(f"{path}: {name}: {error}") from error
         logs[name] = FlightLog(settings, Outcome(known["outcome"]), known["reason"], table)
-    return logs
+        places[name] = known["place"]
+    return {name: logs[name] for name in sorted(logs, key=lambda name: places[name])}
 
 
 def _chosen(path: Path, names: list[str], flight: str | None) -> str:

@@ -106,7 +106,7 @@ def log_story(to: Recorder, flights: Sequence[Shown], title: str, notes: str, co
     several = len(flights) > 1
     for i, one in enumerate(flights):
         entity = to.flight(one.name)
-        to.once(f"{entity}/flight", rr.TextDocument(kept(one.log)))
+        to.once(f"{entity}/flight", rr.TextDocument(kept(one.log, i)))
         log_tracks(to, one, one.log)
         found = {f"{i + 1} {one.name}": summary(one.log)} if several else lanes(one.log)
         for name, changes in found.items():
