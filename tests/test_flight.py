@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,6 +97,12 @@ def test_impossible_settings_are_named() -> None:
         "guidance_period", "wind.steady", "target.segments.0.to", "target.segments", "aircraft",
     ]  # fmt: skip
     assert "did you mean 'ultra_stick_25e'" in problems(wrong)[-1].message
+
+
+def test_a_folder_that_is_no_airframe_is_told_what_it_must_hold(tmp_path: Path) -> None:
+    (problem,) = problems(replace(FLIGHT, aircraft=str(tmp_path)))
+    told = f"{tmp_path}: the folder must hold airframe.toml and a JSBSim model, {tmp_path.name}.xml"
+    assert problem.message == told
 
 
 def test_remark_1_and_an_infeasible_circle_are_warnings() -> None:
