@@ -163,6 +163,17 @@ def test_one_flight_has_nothing_to_be_compared_with(tmp_path: Path) -> None:
     assert done.stderr.endswith("a comparison takes at least two, of kinematic and another plant\n")
 
 
+def test_still_air_and_a_fixed_start_give_one_difference_and_no_interval(tmp_path: Path) -> None:
+    text = EXPERIMENT.replace('"start.heading_deg" = { uniform = [20.0, 60.0] }\n', "").replace("40.0", "10.0", 1)
+    out = run(tmp_path, text)
+    sideslip = finding(compared(out), "sideslip")
+    assert (sideslip["effect"]["pairs"], sideslip["effect"]["seeds"]) == (10, 5)
+    assert sideslip["effect"]["mean"] > 0.0
+    assert sideslip["effect"]["low"] is sideslip["effect"]["high"] is None
+    assert all(cell["p"] is None for cell in sideslip["cells"])
+    assert "No interval (no variation: the seeds change nothing): " in harness("compare", out).stdout
+
+
 def test_flights_of_two_inner_loops_are_not_compared(tmp_path: Path) -> None:
     airframe = tmp_path / "stick"
     shutil.copytree(aircraft.folder("ultra_stick_25e"), airframe)

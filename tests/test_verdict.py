@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from harness.metrics import MEANING
 from harness.verdict.assess import Assess
@@ -198,6 +200,19 @@ def test_one_failing_cell_bars_a_value_and_the_axis_that_saves_most_cells_is_nam
     assert conclusion(cells(at, ("limit", "law")), across) == (NOT, "")
 
 
+@given(passing=st.lists(st.booleans(), min_size=1, max_size=7))
+def test_no_stretch_that_passes_is_longer_than_the_one_named(passing: list[bool]) -> None:
+    values: list[object] = [float(i) for i in range(len(passing))]
+    at = {(value,): ok for value, ok in zip(values, passing, strict=True)}
+    verdict, condition = conclusion(cells(at, ("x",)), {"x": values})
+    longest = max((len(list(run)) for ok, run in itertools.groupby(passing) if ok), default=0)
+    assert verdict == (HOLDS if all(passing) else IF if longest else NOT)
+    if verdict == IF:
+        python = condition if {"<", ">"} & set(condition) else condition.replace("=", "==")
+        named = [ok for value, ok in zip(values, passing, strict=True) if eval(python, {"x": value})]
+        assert named == [True] * longest
+
+
 def test_severities_have_an_order_and_words_have_none() -> None:
     across: dict[str, list[object]] = {"turbulence": ["none", "light", "moderate"]}
     at = {("none",): True, ("light",): True, ("moderate",): False}
@@ -266,10 +281,10 @@ def test_lost_flights_count_against_every_part_of_their_cell() -> None:
     flights.loc[lost, "outcome"] = "departed"
     (card,) = found(flights).scorecards
     assert card.lost.number == 3
-    assert (card.finding("alive").verdict, card.finding("alive").condition) == (IF, "wind.turbulence <= none")
+    assert (card.finding("alive").verdict, card.finding("alive").condition) == (IF, "wind.turbulence is none")
     for finding in card.findings:
         if finding.cells and finding.part.name != "reach":  # that one is about settings
-            assert (finding.verdict, finding.condition) == (IF, "wind.turbulence <= none"), finding.part.name
+            assert (finding.verdict, finding.condition) == (IF, "wind.turbulence is none"), finding.part.name
     assert card.finding("convergence_time").effect.pairs == 2 * SEEDS
 
 

@@ -25,11 +25,12 @@ def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: st
     """
     import json
 
-    from harness.commands.comparing import read_comparison
+    from harness.commands.comparing import busy, read_comparison
     from harness.verdict.words import lines
     from harness.verdict.written import as_csv, as_document, as_latex
 
-    comparison, _ = read_comparison(directory, baseline, overrides)
+    with busy("comparing"):
+        comparison, _ = read_comparison(directory, baseline, overrides)
     match form:
         case "json":
             click.echo(json.dumps(as_document(comparison), allow_nan=False))

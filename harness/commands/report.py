@@ -19,11 +19,7 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
       harness report out/wind
       harness report out/assumption --markdown docs/results.md
     """
-    from contextlib import nullcontext
-
-    from rich.console import Console
-
-    from harness.commands.comparing import read_comparison
+    from harness.commands.comparing import busy, read_comparison
     from harness.commands.telling import BadInput, writable
     from harness.verdict import report as job
 
@@ -32,8 +28,7 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
     if not directory.is_dir():
         raise BadInput(f"{directory}: there is no such directory")
     path = writable(markdown or out or directory / "report.html")
-    terminal = Console(stderr=True)
-    with terminal.status("comparing and drawing") if terminal.is_terminal else nullcontext():
+    with busy("comparing and drawing"):
         comparison, origin = read_comparison(directory, baseline, overrides)
         text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
         partial = path.with_name(f".{path.name}.partial")

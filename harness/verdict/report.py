@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.metrics import MEANING
@@ -13,7 +12,7 @@ from harness.settings.written import written
 from harness.verdict import figures, words
 from harness.verdict.attribution import METRICS, Attribution
 from harness.verdict.comparison import Comparison, Row, axes_of
-from harness.verdict.pairs import settings_of, varying
+from harness.verdict.pairs import axes, spread
 from harness.verdict.scorecard import Finding, Scorecard, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
 
@@ -167,33 +166,19 @@ def shading(card: Scorecard, finding: Finding) -> Iterator[Shading]:
 def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
     """The pairs worth a look: per airframe and plant the lost, the worst of each consequence and the middle one."""
     pairs = comparison.pairs
-    columns = [c for c in varying(pairs.other) if c in settings_of(pairs.other) and not _follows_law(c)]
+    named = spread(pairs.other)
+    columns = [*axes(named), "seed"]
     for index, why in list(_chosen(comparison).items())[:MOST_FLIGHTS]:
         before, after = pairs.reference.loc[index], pairs.other.loc[index]
         keys = str(before["key"])[:12], str(after["key"])[:12]
         yield Listed(
             "; ".join(why),
             f"{after['plant']} {after['aircraft']}",
-            ", ".join(f"{c} = {_setting(after[c])}" for c in columns if c not in ("plant", "aircraft")),
+            ", ".join(f"{column} = {shown(named.loc[index, column])}" for column in columns),
             str(after["outcome"]),
             keys,
             f"harness view {folder} --flight {keys[0]} --flight {keys[1]}",
         )
-
-
-def _follows_law(column: str) -> bool:
-    """A gain says nothing that the law and its set do not."""
-    from autopilot.laws import LAWS
-
-    return column.startswith("law.") and any(
-        column.removeprefix("law.") in gains for law in LAWS.values() for gains in law.gain_sets.values()
-    )
-
-
-def _setting(value: object) -> str:
-    if isinstance(value, tuple):
-        return f"({', '.join(_setting(element) for element in value)})"
-    return f"{value + 0.0:.4g}" if isinstance(value, float | np.floating) else str(value)  # + 0.0: no minus zero
 
 
 def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:

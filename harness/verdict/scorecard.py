@@ -252,7 +252,7 @@ def _runs(values: Sequence[object], passing: Sequence[object]) -> Iterator[list[
 
 
 def _said(axis: str, run: Sequence[object], values: Sequence[object]) -> str:
-    if not is_ordered(values):
+    if not is_ordered(values) or run == ["none"]:
         return f"{axis} is {' or '.join(map(str, run))}"
     least, most = shown(run[0]), shown(run[-1])
     if run[0] == values[0]:

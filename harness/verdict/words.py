@@ -201,7 +201,7 @@ def scorecard_lines(card: Scorecard) -> Iterator[str]:
     """One airframe's scorecard."""
     lost, before, after = of(card.lost), of(card.converged[0]), of(card.converged[1])
     yield f"Scorecard of {card.aircraft}, {card.plant} beside {card.baseline}: {card.pairs} pairs, lost {lost}"
-    head = ("", "verdict", "mean, 95 % interval", "worst", "bound", "cells")
+    head = ("", "verdict", "mean, 95 % interval", "worst", "bound", "cells", "pairs")
     yield from aligned([head, *map(_finding_cells, card.findings)])
     yield from (f"  {note}" for note in without_interval(card))
     yield (
@@ -221,10 +221,10 @@ def without_interval(card: Scorecard) -> Iterator[str]:
 def _finding_cells(finding: Finding) -> tuple[str, ...]:
     worst = finding.worst
     if worst is None:
-        return finding.part.title, finding.verdict, "", "", "", ""
-    limits = bound(worst)
-    cells = f"{finding.passed}/{len(finding.cells)}"
-    return finding.part.title, verdict(finding), short(finding.effect), measured(worst.mean, finding), limits, cells
+        return finding.part.title, finding.verdict, "", "", "", "", ""
+    mean, at_worst = short(finding.effect), measured(worst.mean, finding)
+    cells, pairs = f"{finding.passed}/{len(finding.cells)}", str(finding.effect.pairs)
+    return finding.part.title, verdict(finding), mean, at_worst, bound(worst), cells, pairs
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from harness.verdict.words import answer, plain, signed, unit_of
 
 
 def as_document(comparison: Comparison) -> dict[str, Any]:
-    """Fit for JSON: NaN and infinity are null."""
+    """Fit for JSON: NaN is null, no limit is `inf` as in a settings file."""
     return {
         "answer": answer(comparison),
         "baseline": comparison.baseline,
@@ -50,7 +50,7 @@ def _plain(value: object) -> Any:
         case _ if hasattr(value, "item"):  # numpy's
             return _plain(value.item())
         case float():
-            return value if math.isfinite(value) else None
+            return "inf" if value == math.inf else value if math.isfinite(value) else None
         case _:
             return value
 
