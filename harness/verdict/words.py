@@ -35,24 +35,20 @@ def _holds(card: Scorecard) -> str:
 
 
 def breaks_first(card: Scorecard) -> Finding | None:
-    """The part of the assumption that passes in the smallest share of its cells; of equals, the one furthest out."""
-    broken = [f for f in card.findings if not f.part.consequence and f.cells and f.passed < len(f.cells)]
-    return min(broken, key=lambda f: (f.passed / len(f.cells), -_use(f)), default=None)
-
-
-def _use(finding: Finding) -> float:
-    return finding.worst.use if finding.worst else 0.0
+    """The part of the assumption that fails in the largest share of its cells; of equals, the one furthest out."""
+    broken = [finding for finding in card.findings if not finding.part.consequence and finding.failed]
+    return max(broken, key=lambda f: (f.failed / len(f.cells), f.worst.use if f.worst else 0.0), default=None)
 
 
 def _first(card: Scorecard) -> str:
     finding = breaks_first(card)
     if finding is None or finding.worst is None:
-        return f"on {card.aircraft} nothing"
-    where = f", holds if {finding.condition}" if finding.condition else ""
+        return f"on {card.aircraft} nothing that was measured"
+    where = f" (it holds if {finding.condition})" if finding.condition else ""
     worst = finding.worst
     return (
-        f"on {card.aircraft} {finding.part.title}: within its bound in {finding.passed} of {len(finding.cells)} cells"
-        f"{where}, at worst {measured(worst.mean, finding)} where {bound(worst)} is asked{place(worst)}"
+        f"on {card.aircraft} {finding.part.title}: it fails in {finding.failed} of {len(finding.cells)} cells{where}, "
+        f"at worst with {measured(worst.mean, finding)} where {bound(worst)} is asked{place(worst)}"
     )
 
 
@@ -127,11 +123,6 @@ def measured(value: float, finding: Finding) -> str:
     return signed(value) if unit == "1" else f"{signed(value)} {unit}"
 
 
-def verdict(finding: Finding) -> str:
-    """The verdict with its condition."""
-    return f"{finding.verdict} {finding.condition}".strip()
-
-
 def unit_of(metric: str) -> str:
     """The unit that a metric's name ends with."""
     return next((unit for suffix, unit in UNITS.items() if metric.endswith(f"_{suffix}")), "1")
@@ -159,6 +150,9 @@ def heading(comparison: Comparison) -> Iterator[str]:
         f"{len(comparison.pairs)} pairs of {', '.join(comparison.plants)} beside {comparison.baseline}, {seeds} "
         f"seed{'s' if seeds != 1 else ''}, from {comparison.flights} flights"
     )
+    infeasible = int((comparison.pairs.other["feasibility_margin_deg_s"] < 0.0).sum())
+    if infeasible:
+        yield f"{infeasible} of the pairs are of circles that the heading-rate limit cannot hold"
     yield from _left("have no partner", comparison.unpaired)
     yield from _left("failed and are in no pair", comparison.failed)
 
@@ -201,7 +195,7 @@ def scorecard_lines(card: Scorecard) -> Iterator[str]:
     """One airframe's scorecard."""
     lost, before, after = of(card.lost), of(card.converged[0]), of(card.converged[1])
     yield f"Scorecard of {card.aircraft}, {card.plant} beside {card.baseline}: {card.pairs} pairs, lost {lost}"
-    head = ("", "verdict", "mean, 95 % interval", "worst", "bound", "cells", "pairs")
+    head = ("", "verdict", "mean, 95 % interval", "worst", "bound", "cells", "pairs", "")
     yield from aligned([head, *map(_finding_cells, card.findings)])
     yield from (f"  {note}" for note in without_interval(card))
     yield (
@@ -221,10 +215,10 @@ def without_interval(card: Scorecard) -> Iterator[str]:
 def _finding_cells(finding: Finding) -> tuple[str, ...]:
     worst = finding.worst
     if worst is None:
-        return finding.part.title, finding.verdict, "", "", "", "", ""
+        return finding.part.title, finding.verdict, "", "", "", "", "", ""
     mean, at_worst = short(finding.effect), measured(worst.mean, finding)
     cells, pairs = f"{finding.passed}/{len(finding.cells)}", str(finding.effect.pairs)
-    return finding.part.title, verdict(finding), mean, at_worst, bound(worst), cells, pairs
+    return finding.part.title, finding.verdict, mean, at_worst, bound(worst), cells, pairs, finding.condition
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
