@@ -37,7 +37,7 @@ def tell_survey(matrix: Matrix, found: Survey, done: int) -> None:
     for text in (matrix.experiment.title, matrix.experiment.question):
         if text:
             click.echo(text)
-    click.echo(f"{found.flights} flights" + (f", {done} of them done" if done else ""))
+    click.echo(f"{found.flights} flight{'s' if found.flights != 1 else ''}" + (f", {done} done" if done else ""))
     for key, count in found.varies.items():
         click.echo(f"  {key}: {count} values")
     for key in matrix.draws:

@@ -94,14 +94,13 @@ class Matrix:
 
     @property
     def varies(self) -> dict[str, int]:
-        """The number of values of each key that is an axis, those of one value too."""
+        """The number of values of each axis, those of one value too; of keys that vary together, by their names."""
         found: dict[str, set[object]] = {}
         for block in self.blocks:
             for a in block.axes:
-                for key, values in a.choices().items():
-                    numbers = isinstance(values, range)
-                    found.setdefault(key, set()).update(values if numbers else map(repr, values))
-        return {key: len(values) for key, values in found.items()}
+                values = a.values if isinstance(a.values, range) else map(repr, a.values)
+                found.setdefault(", ".join(a.keys), set()).update(values)
+        return {keys: len(values) for keys, values in found.items()}
 
     def group(self, position: int) -> int:
         """A number that all flights share which differ in the plant alone."""

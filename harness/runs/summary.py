@@ -65,7 +65,8 @@ def summary(matrix: Matrix, folder: Path) -> tuple[list[str], list[Line]]:
 def _axes(matrix: Matrix) -> list[str]:
     """The keys that vary and are not drawn."""
     several = len(matrix.blocks) > 1  # an included flight may differ from the matrix in a key of one value
-    return [key for key, count in matrix.varies.items() if (several or count > 1) and key not in matrix.draws]
+    axes = [key for keys, count in matrix.varies.items() if several or count > 1 for key in keys.split(", ")]
+    return [key for key in dict.fromkeys(axes) if key not in matrix.draws]
 
 
 def _shown(value: object) -> str:

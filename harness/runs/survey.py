@@ -25,7 +25,7 @@ class Survey:
     seconds: float = 0.0  # estimated, of one process
     periods: int = 0  # guidance periods, of all flights together
     mistakes: list[str] = field(default_factory=list)
-    varies: dict[str, int] = field(default_factory=dict)  # the number of values of each key, drawn ones too
+    varies: dict[str, int] = field(default_factory=dict)  # the number of values of each axis
 
     @property
     def idle_seeds(self) -> int:
