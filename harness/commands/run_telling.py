@@ -118,26 +118,27 @@ def tell_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     from harness.commands.telling import number
     from harness.runs.summary import SHOWN, summary
 
-    axes, lines = summary(matrix, out)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for key in axes:
-        table.add_column(key, no_wrap=True)
-    for heading in ("flights", "settle"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    results = summary(matrix, out, _MOST_LINES)
+    ended = any(set(line.outcomes) != {"completed"} for line in results.lines)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 2, 0, 0))
+    for keys in results.axes:
+        table.add_column(", ".join(key.rpartition(".")[2] for key in keys.split(", ")), no_wrap=True)
+    table.add_column("settle", justify="right", no_wrap=True)
     for heading, unit, _ in SHOWN.values():
         table.add_column(f"{heading}\n{unit}", justify="right", no_wrap=True)
-    table.add_column("outcomes")
-    for line in lines[:_MOST_LINES]:
-        cells = []
+    if ended:
+        table.add_column("ended", no_wrap=True)
+    for line in results.lines:
+        cells = [*line.labels, f"{line.settled} of {line.flights}"]
         for name, (_, _, scale) in SHOWN.items():
             value = line.medians[name]
             cells.append(number(None if value is None else scale * value))
-        outcomes = ", ".join(f"{count} {outcome}" for outcome, count in line.outcomes.items())
-        table.add_row(*line.labels, str(line.flights), str(line.settled), *cells, outcomes)
-    console = Console(width=None if sys.stdout.isatty() else 200, soft_wrap=False)
-    console.print(table)
-    if len(lines) > _MOST_LINES:
-        click.echo(f"... and {len(lines) - _MOST_LINES} lines more")
+        if ended:
+            cells.append(", ".join(f"{count} {outcome}" for outcome, count in line.outcomes.items()))
+        table.add_row(*cells)
+    Console(width=500).print(table)  # never cut: a narrow terminal wraps the lines
+    if results.more:
+        click.echo(f"... and {results.more} lines more; all: harness.load_results({str(out)!r}) in Python")
     for reason, count in sorted(progress.reasons.items(), key=lambda item: -item[1])[:_MOST_REASONS]:
         click.echo(f"failed: {count} x {reason}")
     for problem in progress.recordings[:_MOST_REASONS]:

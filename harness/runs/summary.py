@@ -2,7 +2,7 @@
 
 import json
 import statistics
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from harness.runs.store import reading
 
 SHOWN: Mapping[str, tuple[str, str, float]] = MappingProxyType(
     {  # heading, unit, how many of them make the metric's own unit
-        "convergence_time_s": ("settles", "s", 1.0),
+        "convergence_time_s": ("after", "s", 1.0),
         "range_error_rms_m": ("error", "m rms", 1.0),
         "range_error_peak_m": ("error", "m peak", 1.0),
         "saturation_fraction": ("saturated", "%", 100.0),
@@ -28,17 +28,29 @@ class Line(NamedTuple):
     """Flights alike but for what is drawn."""
 
     labels: tuple[str, ...]  # the value of each axis
-    flights: int
+    outcomes: Mapping[str, int]  # how many flights ended so
     settled: int  # of them
-    outcomes: Mapping[str, int]
     medians: Mapping[str, float | None]  # of those that have the metric
 
+    @property
+    def flights(self) -> int:
+        return sum(self.outcomes.values())
 
-def summary(matrix: Matrix, folder: Path) -> tuple[list[str], list[Line]]:
-    """The axes that lines are grouped by, and the lines, in the order of the matrix; flights of its positions only."""
-    axes = [key for key in _axes(matrix) if key != "seed"]
-    values: dict[tuple[str, ...], dict[str, list[float]]] = {}
-    outcomes: dict[tuple[str, ...], dict[str, int]] = {}
+
+class Summary(NamedTuple):
+    """Results by the axes of a matrix."""
+
+    axes: Sequence[str]  # keys that vary together with commas
+    lines: Sequence[Line]  # in the order of the matrix
+    more: int  # lines that are left out
+
+
+def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
+    """The results of the matrix's flights so far, in `most` lines."""
+    axes = _axes(matrix)
+    keys = [axis.split(", ") for axis in axes]
+    groups: dict[tuple[str, ...], _Group] = {}
+    left_out: set[tuple[str, ...]] = set()
     with reading(folder) as journal:
         rows = journal.execute(
             "SELECT f.outcome, f.settings, f.metrics FROM positions p JOIN flights f USING (key) "
@@ -46,32 +58,40 @@ def summary(matrix: Matrix, folder: Path) -> tuple[list[str], list[Line]]:
             (matrix.identifier,),
         )
         for outcome, settings, metrics in rows:
-            flat, judged = flat_settings(json.loads(settings)), json.loads(metrics)
-            label = tuple(_shown(flat.get(key)) for key in axes)
-            count = outcomes.setdefault(label, {})
-            count[outcome] = count.get(outcome, 0) + 1
-            kept = values.setdefault(label, {name: [] for name in SHOWN})
-            for name in SHOWN:
-                if judged.get(name) is not None:
-                    kept[name].append(judged[name])
-    lines = []
-    for label, kept in values.items():
-        medians = {name: statistics.median(found) if found else None for name, found in kept.items()}
-        count = outcomes[label]
-        lines.append(Line(label, sum(count.values()), len(kept["convergence_time_s"]), count, medians))
-    return axes, lines
+            flat = flat_settings(json.loads(settings))
+            labels = tuple(" ".join(_shown(flat.get(key)) for key in together) for together in keys)
+            if labels not in groups and len(groups) == most:
+                left_out.add(labels)
+            else:
+                groups.setdefault(labels, _Group()).add(outcome, json.loads(metrics))
+    return Summary(axes, [group.line(labels) for labels, group in groups.items()], len(left_out))
+
+
+class _Group:
+    def __init__(self) -> None:
+        self._outcomes: dict[str, int] = {}
+        self._values: dict[str, list[float]] = {name: [] for name in SHOWN}
+
+    def add(self, outcome: str, metrics: Mapping[str, float | None]) -> None:
+        self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1
+        for name, values in self._values.items():
+            if (value := metrics.get(name)) is not None:
+                values.append(value)
+
+    def line(self, labels: tuple[str, ...]) -> Line:
+        medians = {name: statistics.median(values) if values else None for name, values in self._values.items()}
+        return Line(labels, self._outcomes, len(self._values["convergence_time_s"]), medians)
 
 
 def _axes(matrix: Matrix) -> list[str]:
-    """The keys that vary and are not drawn."""
+    """Those that vary and are not drawn over."""
     several = len(matrix.blocks) > 1  # an included flight may differ from the matrix in a key of one value
-    axes = [key for keys, count in matrix.varies.items() if several or count > 1 for key in keys.split(", ")]
-    return [key for key in dict.fromkeys(axes) if key not in matrix.draws]
+    return [keys for keys, count in matrix.varies.items() if (several or count > 1) and keys != "seed"]
 
 
 def _shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return ", ".join(map(_shown, value))
+        return f"[{', '.join(map(_shown, value))}]"
     return "-" if value is None else str(value)
