@@ -216,6 +216,8 @@ def _is_multiple(period: float, unit: float) -> bool:
 def _target_states(flight: Flight) -> list[TargetState]:
     """The target during the flight, at its breakpoints and twice a second."""
     at = flight.target.start()
+    if flight.target.track is None and not flight.target.speed and not flight.target.segments:
+        return [at(0.0)]  # at rest
     times = {*flight.target.breakpoints(), *(0.5 * k for k in range(int(2 * flight.duration) + 1))}
     return [at(t) for t in times if 0.0 <= t <= flight.duration]
 

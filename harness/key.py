@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,18 +17,25 @@ PHYSICS = 1  # of the plants, the wind and the loop: raised whenever a change th
 METRICS = 1  # of what a log is judged by: raised whenever a change there moves a metric
 
 
+class Version(NamedTuple):
+    """All that decides a flight, and how it is judged, beside its settings."""
+
+    number: str  # a hash of it
+    decides: Mapping[str, Any]  # of the physics, of the libraries, and a hash of each file's content
+
+
 class Identity(NamedTuple):
     """What makes a flight this one."""
 
     settings: Mapping[str, Any]  # a [flight] table in file units
-    version: Mapping[str, Any]  # all else: of the physics, of the libraries, and a hash of each file's content
+    version: Version
 
     @property
     def key(self) -> str:
         settings = self.settings
         if settings["target"]["track"] is not None:  # its content counts, not where it lies
             settings = {**settings, "target": {**settings["target"], "track": "content"}}
-        return hashed({"settings": settings, **self.version})
+        return hashed({"settings": settings, "version": self.version.number})
 
 
 def identity(flight: Flight) -> Identity:
@@ -36,16 +43,17 @@ def identity(flight: Flight) -> Identity:
     return Identity(document(flight), version_of(flight))
 
 
-def version_of(flight: Flight) -> dict[str, Any]:
-    """All that decides the flight beside its settings, as it is now."""
-    return {
-        "physics": PHYSICS,
-        "metrics": METRICS,
-        "content": {name: _digest(path, path.stat().st_mtime_ns) for name, path in files(flight).items()},
-        "jsbsim": _installed("jsbsim") if flight.plant == "sixdof" else None,
-        "turbulence": [_installed("numpy"), _installed("scipy")] if flight.wind.turbulence != "none" else None,
-        "filterpy": _installed("filterpy") if flight.estimator.kind == "ekf" else None,
+def version_of(flight: Flight) -> Version:
+    """All that decides the flight beside its settings, as it is now. OSError when a file is gone."""
+    libraries = {
+        "jsbsim": ("jsbsim",) if flight.plant == "sixdof" else (),
+        "turbulence": ("numpy", "scipy") if flight.wind.turbulence != "none" else (),
+        "filterpy": ("filterpy",) if flight.estimator.kind == "ekf" else (),
     }
+    paths = _paths(flight.plant, flight.aircraft, flight.target.track)
+    return _version(
+        tuple((name, path, Path(path).stat().st_mtime_ns) for name, path in paths), tuple(libraries.items())
+    )
 
 
 def flight_key(flight: Flight) -> str:
@@ -55,21 +63,38 @@ def flight_key(flight: Flight) -> str:
 
 def files(flight: Flight) -> dict[str, Path]:
     """Every file whose content decides the flight, by a name that says what it is for."""
+    return {name: Path(path) for name, path in _paths(flight.plant, flight.aircraft, flight.target.track)}
+
+
+@lru_cache(maxsize=256)
+def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, str], ...]:
     on_board = Path(autopilot.__file__).parent
-    found = {f"autopilot/{name}": on_board / name for name in _sources(on_board)}
-    if flight.target.track is not None:
-        found["target/track"] = Path(flight.target.track)
-    if flight.plant == "sixdof":
+    found = {f"autopilot/{path.name}": path for path in sorted(on_board.glob("*.py"))}
+    if track is not None:
+        found["target/track"] = Path(track)
+    if plant == "sixdof":
         found["autopilot/inner_loop.xml"] = on_board / "inner_loop.xml"
         found["harness/plants/planet.xml"] = Path(__file__).parent / "plants" / "planet.xml"
-    if flight.plant != "kinematic":
-        airframe = aircraft.folder(flight.aircraft)
+    if plant != "kinematic":
+        airframe = aircraft.folder(name)
         found["aircraft/model"] = aircraft.model(airframe)
         names = ["airframe.toml", "inner_loop.toml"]
-        if flight.plant in IDENTIFIED_PLANTS:
+        if plant in IDENTIFIED_PLANTS:
             names.append(aircraft.identified(airframe).name)
         found |= {f"aircraft/{name}": airframe / name for name in names}
-    return found
+    return tuple((name, str(path)) for name, path in found.items())
+
+
+@lru_cache(maxsize=256)
+def _version(files: tuple[tuple[str, str, int], ...], libraries: tuple[tuple[str, tuple[str, ...]], ...]) -> Version:
+    """Of files by name, path and time of change, and of the libraries for each purpose."""
+    decides = {
+        "physics": PHYSICS,
+        "metrics": METRICS,
+        "content": {name: content_hash(Path(path).read_bytes()) for name, path, _ in files},
+        **{purpose: {name: version(name) for name in names} or None for purpose, names in libraries},
+    }
+    return Version(hashed(decides), decides)
 
 
 def hashed(content: object) -> str:
@@ -81,17 +106,3 @@ def hashed(content: object) -> str:
 def content_hash(content: bytes) -> str:
     """32 hex digits of a file's content."""
     return hashlib.blake2b(content, digest_size=16).hexdigest()
-
-
-@cache
-def _sources(on_board: Path) -> tuple[str, ...]:
-    """The Python files of the autopilot: a process runs those that it found when it began."""
-    return tuple(sorted(path.name for path in on_board.glob("*.py")))
-
-
-_installed = cache(version)
-
-
-@lru_cache(maxsize=256)
-def _digest(path: Path, modified: int) -> str:
-    return content_hash(path.read_bytes())

@@ -64,7 +64,7 @@ def recall(place: Place) -> Recalled:
         settings["target"]["track"] = str(_unpacked(place.folder, {name: then["target/track"]}) / name)
     settings["aircraft"] = _airframe(place.folder, settings["aircraft"], then)
     flight = flight_from_document(settings)
-    now = version_of(flight)
+    now = version_of(flight).decides
     changed = [name for name, digest in then.items() if now["content"].get(name) != digest]
     changed += [name for name in now["content"] if name not in then]
     changed += [name for name, value in now.items() if name != "content" and value != stored.version.get(name)]

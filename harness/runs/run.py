@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from harness.key import Identity, files, hashed, identity, version_of
+from harness.key import Identity, files, identity, version_of
 from harness.plant import Outcome
 from harness.runs.estimate import Estimate
 from harness.runs.matrix import Matrix
@@ -84,7 +84,7 @@ def _keep(store: Store, done: Done, of: Identity, progress: Progress) -> None:
         )
     if problem:
         progress.recordings.append(problem)
-    store.add_version(version, of.version, files(task.flight))
+    store.add_version(of.version, files(task.flight))
     store.add(row(task.flight, of, how), how, version, task.position)
     progress.done += 1
     if Outcome(how.outcome).failed:
@@ -121,7 +121,7 @@ def _tasks(
             continue
         known.add(of.key)
         pending[of.key] = of
-        yield Task(of.key, position, flight, hashed(of.version), recorded(position))
+        yield Task(of.key, position, flight, of.version.number, recorded(position))
 
 
 def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> frozenset[int]:
@@ -140,7 +140,7 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> froze
                 now = version_of(flight_from_document(settings))
             except (SettingsError, OSError):
                 continue  # its files are gone
-            if hashed(now) == version:
+            if now.number == version:
                 current.append(version)
         return frozenset(positions(journal, matrix.identifier, current, failed=not retry_failed))
 

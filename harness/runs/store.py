@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from harness.key import content_hash
+from harness.key import Version, content_hash
 from harness.plant import Outcome
 from harness.runs.provenance import Provenance, now
 from harness.runs.row import Judged, Row
@@ -107,20 +107,21 @@ class Store:
         self._change("UPDATE runs SET ended = ? WHERE id = ?", (now(), self._run))
         self.commit()
 
-    def add_version(self, number: str, version: Mapping[str, Any], files: Mapping[str, Path]) -> None:
+    def add_version(self, version: Version, files: Mapping[str, Path]) -> None:
         """Keeps what decides flights beside their settings, and the files that it has hashes of."""
-        if number in self._versions:
+        if version.number in self._versions:
             return
+        hashes = version.decides["content"]
         for name, path in files.items():
             try:
                 content = path.read_bytes()
             except OSError as error:
                 raise StoreError(f"{path}: {error.strerror or error}, while flights were flown") from None
-            if content_hash(content) != version["content"][name]:
+            if content_hash(content) != hashes[name]:
                 raise StoreError(f"{path}: has changed while flights were flown: run the same command again")
-            self._change("INSERT OR IGNORE INTO files VALUES (?, ?)", (version["content"][name], content))
-        self._change("INSERT INTO versions VALUES (?, ?)", (number, json.dumps(version)))
-        self._versions.add(number)
+            self._change("INSERT OR IGNORE INTO files VALUES (?, ?)", (hashes[name], content))
+        self._change("INSERT INTO versions VALUES (?, ?)", (version.number, json.dumps(version.decides)))
+        self._versions.add(version.number)
 
     def add(self, row: Row, how: Judged, version: str, position: int) -> None:
         """Keeps a row, for good within half a second."""

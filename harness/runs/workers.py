@@ -24,7 +24,7 @@ from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
 from harness.flight import Flight
-from harness.key import hashed, version_of
+from harness.key import version_of
 from harness.plant import Outcome
 from harness.runs.estimate import CHUNK, Estimate
 from harness.runs.row import Judged, failed, flown, judged
@@ -89,7 +89,7 @@ def fly_task(task: Task, folder: Path) -> Flown:
         from harness.runs.recordings import record
 
         problem = record(log, task.key, folder)
-    return Flown(how, hashed(version_of(task.flight)), problem)
+    return Flown(how, version_of(task.flight).number, problem)
 
 
 def _failed(task: Task, outcome: Outcome, reason: str) -> Done:

@@ -7,6 +7,8 @@ from autopilot.quantities import Unit
 
 def in_file(value: float, unit: Unit) -> float:
     """The shortest number in the file's unit that is read back as exactly this value, if there is one."""
+    if unit.si == 1.0:
+        return value
     quotient = value / unit.si
     below, above = math.nextafter(quotient, -math.inf), math.nextafter(quotient, math.inf)
     near = [float(f"{quotient:.15g}"), float(f"{quotient:.16g}"), quotient, below, above]
