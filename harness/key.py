@@ -51,9 +51,8 @@ def version_of(flight: Flight) -> Version:
         "filterpy": ("filterpy",) if flight.estimator.kind == "ekf" else (),
     }
     paths = _paths(flight.plant, flight.aircraft, flight.target.track)
-    return _version(
-        tuple((name, path, Path(path).stat().st_mtime_ns) for name, path in paths), tuple(libraries.items())
-    )
+    changed = tuple((name, path, Path(path).stat().st_mtime_ns) for name, path in paths)
+    return _version(PHYSICS, METRICS, changed, tuple(libraries.items()))
 
 
 def flight_key(flight: Flight) -> str:
@@ -86,11 +85,16 @@ def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, str], .
 
 
 @lru_cache(maxsize=256)
-def _version(files: tuple[tuple[str, str, int], ...], libraries: tuple[tuple[str, tuple[str, ...]], ...]) -> Version:
+def _version(
+    physics: int,
+    metrics: int,
+    files: tuple[tuple[str, str, int], ...],
+    libraries: tuple[tuple[str, tuple[str, ...]], ...],
+) -> Version:
     """Of files by name, path and time of change, and of the libraries for each purpose."""
     decides = {
-        "physics": PHYSICS,
-        "metrics": METRICS,
+        "physics": physics,
+        "metrics": metrics,
         "content": {name: content_hash(Path(path).read_bytes()) for name, path, _ in files},
         **{purpose: {name: version(name) for name in names} or None for purpose, names in libraries},
     }
