@@ -52,7 +52,7 @@ def metrics(log: FlightLog) -> dict[str, float | None]:
     lag, gain = _lag_and_gain(held, flown, period)
     unlimited = log["unlimited_command"][half:]
     return {
-        "convergence_time_s": _settling_time(time, error, log.flight.metrics.tolerance),
+        "convergence_time_s": settling_time(time, error, log.flight.metrics.tolerance),
         "range_error_final_m": float(error[-1]),
         "range_error_rms_m": _rms(error[half:]),
         "range_error_peak_m": _peak(error[half:]),
@@ -72,7 +72,8 @@ def metrics(log: FlightLog) -> dict[str, float | None]:
     }
 
 
-def _settling_time(time: Array, error: Array, tolerance: float) -> float | None:
+def settling_time(time: Array, error: Array, tolerance: float) -> float | None:
+    """When |error| is below the tolerance for good, with 5 s at least left; None when that is never."""
     outside = np.flatnonzero(~(np.abs(error) < tolerance))
     first = outside[-1] + 1 if outside.size else 0
     if first >= len(time) or time[-1] - time[first] < SETTLED_FOR:

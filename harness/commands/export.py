@@ -53,6 +53,7 @@ def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
     from harness.commands.telling import BadInput
     from harness.runs.recall import place_of
     from harness.runs.store import StoreError, find
+    from harness.settings import SettingsError
 
     try:
         if place := place_of(what):
@@ -70,5 +71,5 @@ def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
         return read_recording(Path(what), flight), Path(what).stem
     except OSError as error:
         raise BadInput(f"{what}: {error.strerror or error}") from None
-    except (StoreError, ValueError) as error:
+    except (StoreError, SettingsError, ValueError) as error:
         raise BadInput(str(error)) from None

@@ -75,6 +75,7 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
     from harness.review.shown import MOST
     from harness.runs.recall import place_of
     from harness.runs.store import StoreError
+    from harness.settings import SettingsError
 
     if pair is not None and flights:
         raise BadInput("--pair or --flight, not both")
@@ -96,7 +97,7 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
         if pair is not None:
             return named(pair_of_row(path, pair, _say))
         return named(_rows(path, flights))
-    except (StoreError, ValueError) as error:
+    except (StoreError, SettingsError, ValueError) as error:
         raise BadInput(str(error)) from None
 
 

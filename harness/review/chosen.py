@@ -11,7 +11,7 @@ from harness.runs.recall import Place, fly_again, recall
 from harness.runs.recordings import recording_path
 from harness.runs.results import flat_settings
 from harness.runs.store import find, on_each_plant
-from harness.settings import document, flight_from_document
+from harness.settings import SettingsError, document, flight_from_document
 from harness.simulation import simulate
 
 Say = Callable[[str], None]
@@ -60,7 +60,7 @@ def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
         say(f"{plant}: not in {folder}, flown anew")
         try:
             logs.append(simulate(flight_from_document({**settings, "plant": plant})))
-        except ValueError as error:
+        except (ValueError, SettingsError) as error:
             say(f"{plant}: left out, it cannot start: {error}")
     return logs
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.flight_log import FlightLog
-from harness.metrics import metrics
+from harness.metrics import settling_time
 from harness.plant import Outcome
 from harness.review.shown import Colour
 
 WINDOW = 1.0  # s: a lane tells of windows this long, so that a command that chatters can be read
-MOST_EVENTS = 30  # of one lane; a lane that changes more often is told as one event
+MOST_EVENTS = 15  # of one lane; a lane that changes more often is told as one event
 GUSTS = (0.25, 0.1)  # of the nominal airspeed
 
 _GREEN, _BLUE, _AMBER, _RED, _SLATE = (70, 150, 80), (60, 115, 175), (200, 130, 40), (200, 60, 60), (85, 90, 100)
@@ -84,19 +84,19 @@ def summary(log: FlightLog) -> list[Change]:
     return [*_merged([*before, *settled]), *_ending(log)]
 
 
-def events(log: FlightLog, others: bool = False) -> list[Event]:
-    """What happened, in the order of time; as one of the `others`, without what target and air do for all."""
+def events(log: FlightLog, told: Mapping[str, Sequence[Change]], others: bool = False) -> list[Event]:
+    """What happened, in the order of time, also as its lanes tell; of the `others` without target and air."""
     if not len(log):
         return [Event(0.0, "WARN", _end_text(log))]
     found = [*_crossing(log), *(() if others else _gust(log))]
-    for name, changes in lanes(log).items():
+    for name, changes in told.items():
         if others and name in ("air", "target"):
             continue
-        told = [change for change in changes if change.state != log.outcome.value]
-        if len(told) > MOST_EVENTS:
-            found.append(Event(told[0].time, "INFO", f"{name}: {told[0].state}; then {len(told) - 1} changes"))
+        states = [change for change in changes if change.state != log.outcome.value]
+        if len(states) > MOST_EVENTS:
+            found.append(Event(states[0].time, "INFO", f"{name}: {states[0].state}; then {len(states) - 1} changes"))
         else:
-            found += [Event(time, _level(state), f"{name}: {state}") for time, state in told]
+            found += [Event(time, _level(state), f"{name}: {state}") for time, state in states]
     completed = log.outcome is Outcome.COMPLETED
     found.append(Event(float(log["time"][-1]), "INFO" if completed else "WARN", _end_text(log)))
     return sorted(found, key=lambda event: event.time)
@@ -110,8 +110,8 @@ def command_lane(log: FlightLog) -> list[Change]:
 
 
 def _circle(log: FlightLog) -> list[Change]:
-    settled = metrics(log)["convergence_time_s"]
     tolerance = log.flight.metrics.tolerance
+    settled = settling_time(log["time"], log["range_error"], tolerance)
     inside = [bool((np.abs(part) < tolerance).all()) for part in _windows(log, log["range_error"])]
     changes = _lane(log, ["within tolerance" if one else "outside tolerance" for one in inside])
     if settled is None:

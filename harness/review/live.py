@@ -65,7 +65,7 @@ class Live:
         new = FlightLog(log.flight, log.outcome, log.reason, log.table[self._sent :])
         if not len(new):
             return
-        content = content_of([one._replace(log=new)])
+        content = content_of([one._replace(log=new)], lanes=2 + (log.flight.plant == "sixdof"))
         if not self._sent:
             self._open(one, content)
         for plot in (*content.overview, *content.aircraft, *content.target):
@@ -82,8 +82,7 @@ class Live:
 
     def _open(self, one: Shown, content: Content) -> None:
         """The layout for the whole flight, though it has just begun."""
-        duration, kinds = one.log.flight.duration, 2 + (one.log.flight.plant == "sixdof")
-        self._to.layout(layout(content._replace(until=duration, growing=True, lanes=kinds)))
+        self._to.layout(layout(content._replace(until=one.log.flight.duration, growing=True)))
         self._to.stream.send_recording_name(self._title)
         log_surroundings(self._to, one.log)
         log_airframe(self._to, one, [one])

@@ -3,6 +3,7 @@
 import json
 import platform
 from collections.abc import Sequence
+from functools import cache
 
 from harness.commands.telling import feasibility_line, number
 from harness.flight import warnings
@@ -13,6 +14,8 @@ from harness.review.shown import Shown
 from harness.runs.provenance import packages
 from harness.runs.results import flat_settings
 from harness.settings import document
+
+_packages = cache(packages)
 
 
 def result_notes(flights: Sequence[Shown], title: str, above: str, command: str) -> str:
@@ -38,7 +41,7 @@ def result_notes(flights: Sequence[Shown], title: str, above: str, command: str)
 
 def settings_notes(flights: Sequence[Shown]) -> str:
     """Provenance of the recording, the settings of the first flight whole, and of the others what differs."""
-    made_with = {**packages(), "physics": str(PHYSICS), "python": platform.python_version(), "on": platform.platform()}
+    made_with = {**_packages(), "physics": str(PHYSICS), "python": platform.python_version(), "on": platform.platform()}
     parts = ["## Provenance", _table([["what", "version"], *([name, value] for name, value in made_with.items())])]
     parts.append(
         _table([["flight", "key", "digest"], *([f.name, flight_key(f.log.flight), f.log.digest] for f in flights)])

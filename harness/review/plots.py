@@ -80,9 +80,17 @@ _AIRCRAFT = (
     _Content("load", "Load factor", "g", 1.0, (_Line("load_factor", "n_z"),)),
     _Content("lateral", "Lateral specific force", "m/s2", 1.0, (_Line("lateral_acceleration", "along the wing"),)),
     _Content("throttle", "Throttle", "%", 100.0, (_Line("throttle", "throttle"),), 5.0),
-    _Content("aileron", "Aileron", "deg", DEG, (_Line("aileron", "right roll +"),)),
-    _Content("elevator", "Elevator", "deg", DEG, (_Line("elevator", "nose down +"),)),
-    _Content("rudder", "Rudder", "deg", DEG, (_Line("rudder", "nose left +"),)),
+    _Content(
+        "surfaces",
+        "Surfaces",
+        "deg",
+        DEG,
+        (
+            _Line("aileron", "aileron, right roll +"),
+            _Line("rudder", "rudder, left +"),
+            _Line("elevator", "elevator, down +"),
+        ),
+    ),
     _Content(
         "wind",
         "Wind at the aircraft, towards",
@@ -133,11 +141,13 @@ def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
     if high - low > 7.0 * step:
         step *= 10.0
     first, last = math.ceil(low / step), math.floor(high / step)
-    if first > last:  # no number: both neighbours
+    most = 0.7 * (high - low)  # of room given away for a number
+    if first > last and step <= most + (high - low):  # no number: both neighbours
         return last * step - margin, first * step + margin
     if first == last:  # one: the neighbour that is nearer
         below, above = low - (first - 1) * step, (last + 1) * step - high
-        return (low, high + above + margin) if above < below else (low - below - margin, high)
+        if min(below, above) <= most:
+            return (low, high + above + margin) if above < below else (low - below - margin, high)
     return low, high
 
 

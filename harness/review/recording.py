@@ -40,16 +40,15 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command
         partial.unlink(missing_ok=True)
 
 
-def content_of(flights: Sequence[Shown]) -> Content:
-    """What is drawn of these flights."""
-    several = len(flights) > 1
+def content_of(flights: Sequence[Shown], lanes: int) -> Content:
+    """What is drawn of these flights, beside that many lanes."""
     return Content(
         flights,
         overview_plots(flights),
         difference_plots(flights),
         aircraft_plots(flights),
         target_plots(flights),
-        len(flights) if several else len(lanes(flights[0].log)),
+        lanes,
         end(flights),
     )
 
@@ -108,10 +107,10 @@ def log_story(to: Recorder, flights: Sequence[Shown], title: str, notes: str, co
         entity = to.flight(one.name)
         to.once(f"{entity}/flight", rr.TextDocument(kept(one.log, i)))
         log_tracks(to, one, one.log)
-        found = {f"{i + 1} {one.name}": summary(one.log)} if several else lanes(one.log)
-        for name, changes in found.items():
+        found = lanes(one.log)
+        for name, changes in ({f"{i + 1} {one.name}": summary(one.log)} if several else found).items():
             log_lane(to, name, changes)
-        happened = events(one.log, others=i > 0)
+        happened = events(one.log, found, others=i > 0)
         texts = rr.TextLog.columns(
             text=[f"{one.name}: {event.text}" if several else event.text for event in happened],
             level=[event.level for event in happened],
@@ -126,7 +125,7 @@ def log_story(to: Recorder, flights: Sequence[Shown], title: str, notes: str, co
 def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     """The file's content. Made in memory: Rerun's own file sink waits for ever when the disk is full."""
     flights = shown(logs)
-    content = content_of(flights)
+    content = content_of(flights, len(flights) if len(flights) > 1 else len(lanes(flights[0].log)))
     to = Recorder()
     memory = to.stream.memory_recording()
     to.stream.set_log_time_enabled(False)

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 TRAIL = 60.0  # s
 _STRIP = 1.0  # s, of one piece of the trail
+_MOVES = 0.1  # s, between two poses
+_CORNERS = 0.25  # s, between two corners of a whole track
 _NEAR = 4.0  # how many times its size an aircraft has in the chase view
 _ELEVATION = math.radians(55.0)  # of the eye above the scene
 _HALF_VIEW = 0.46  # height per distance: inside what Rerun's eye sees, tan(55 deg / 2) up and down
@@ -43,8 +45,8 @@ def log_surroundings(to: Recorder, log: FlightLog) -> None:
 
 def log_target(to: Recorder, log: FlightLog) -> None:
     """Where the target is, and where the law takes it to be."""
-    ground = _ground(log)
-    to.columns("/target/position", log["time"], rr.Transform3D.columns(translation=ground))
+    rows = _every(_MOVES, log)
+    to.columns("/target/position", log["time"][rows], rr.Transform3D.columns(translation=_ground(log)[rows]))
     if log.flight.estimator.kind == "ekf":
         seen = np.column_stack([log["target_north_seen"], log["target_east_seen"], np.zeros(len(log))])
         new = np.isfinite(log["innovation_range"])
@@ -56,8 +58,9 @@ def log_tracks(to: Recorder, one: Shown, whole: FlightLog) -> None:
     """What is known when the flight is over: the whole way of the aircraft and of the target, and how it ended."""
     entity = to.flight(one.name)
     faint = mixed(one.colour, _BLACK, 0.35)
-    to.once(f"{entity}/track", _lines([_track(whole) + _below(one)], faint, 0.4 * one.width))
-    to.once("/target/track", _lines([_ground(whole)], TARGET, 1.0))
+    corners = _every(_CORNERS, whole)
+    to.once(f"{entity}/track", _lines([_track(whole)[corners] + _below(one)], faint, 0.4 * one.width))
+    to.once("/target/track", _lines([_ground(whole)[corners]], TARGET, 1.0))
     if whole.outcome.value != "completed" and len(whole):
         to.once(f"{entity}/end", _label(_track(whole)[-1:], one.colour, 5.0, whole.outcome.value))
 
@@ -75,14 +78,15 @@ def log_airframe(to: Recorder, one: Shown, flights: Sequence[Shown]) -> None:
 
 def log_motion(to: Recorder, one: Shown, rows: FlightLog) -> None:
     """The aircraft's pose at each row: level on its track, and banked within that."""
-    entity, time, track = to.flight(one.name), rows["time"], _track(rows)
-    yaw = np.where(np.isnan(rows["yaw"]), rows["heading"], rows["yaw"])  # without a nose, along its heading
+    entity, some = to.flight(one.name), _every(_MOVES, rows)
+    yaw = np.where(np.isnan(rows["yaw"]), rows["heading"], rows["yaw"])[some]  # without a nose, along its heading
     level = Rotation.from_euler("Z", yaw[:, np.newaxis]).as_quat()
-    attitude = np.column_stack([np.nan_to_num(rows["pitch"]), np.nan_to_num(rows["bank"])])
-    to.columns(f"{entity}/vehicle", time, rr.Transform3D.columns(translation=track, quaternion=level))
+    pose = rr.Transform3D.columns(translation=_track(rows)[some], quaternion=level)
+    to.columns(f"{entity}/vehicle", rows["time"][some], pose)
     if not np.isnan(rows["bank"]).all():
-        banked = Rotation.from_euler("YX", attitude).as_quat()
-        to.columns(f"{entity}/vehicle/body", time, rr.Transform3D.columns(quaternion=banked))
+        attitude = np.column_stack([np.nan_to_num(rows["pitch"]), np.nan_to_num(rows["bank"])])[some]
+        banked = rr.Transform3D.columns(quaternion=Rotation.from_euler("YX", attitude).as_quat())
+        to.columns(f"{entity}/vehicle/body", rows["time"][some], banked)
 
 
 def log_trail(to: Recorder, one: Shown, rows: FlightLog) -> int:
@@ -110,7 +114,9 @@ def scene_view(flights: Sequence[Shown], aspect: float, name: str = "Scene") -> 
     x, y, z = axes @ np.vstack([ground, rims, start, *(_track(one.log) for one in flights)]).T
     # From (X, Y, Z) a point is seen where |x - X| <= w (Z - z) and |y - Y| <= h (Z - z): each side asks for X +- w Z
     w, h = aspect * _HALF_VIEW, _HALF_VIEW
-    right, left, top, bottom = (x + w * z).max(), (w * z - x).max(), (y + h * z).max(), (h * z - y).max()
+    wing = 0.5 * enlargement(flights) * size(reference.flight)[0]
+    right, left = (x + w * z).max() + wing, (w * z - x).max() + wing
+    top, bottom = (y + h * z).max() + 0.5 * wing, (h * z - y).max() + 0.5 * wing
     eye = 0.5 * np.array((right - left, top - bottom, max((right + left) / w, (top + bottom) / h)))
     look = np.array((eye[0], eye[1], z.mean()))
     grid = 10.0 ** round(math.log10(0.35 * eye[2] / 2.0))
@@ -152,7 +158,15 @@ def chase_view(one: Shown, flights: Sequence[Shown]) -> rrb.Spatial3DView:
 def enlargement(flights: Sequence[Shown]) -> float:
     """How many times its size an aircraft has in the scene: a third of the circle's radius wide, or so."""
     needed = 0.3 * flights[0].log.flight.law.standoff / size(flights[0].log.flight)[0]
-    return float(min((1, 2, 5, 10, 20, 40, 60, 80, 100, 200, 500, 1000), key=lambda x: abs(math.log(x / needed))))
+    return float(
+        min((1, 2, 3, 5, 7, 10, 15, 20, 30, 40, 60, 80, 100, 200, 500, 1000), key=lambda x: abs(math.log(x / needed)))
+    )
+
+
+def _every(seconds: float, rows: FlightLog) -> NDArray[np.int64]:
+    """Rows that far apart, and the last."""
+    step = max(1, round(seconds / rows.flight.guidance_period))
+    return np.unique(np.append(np.arange(0, len(rows), step), np.arange(len(rows))[-1:])).astype(np.int64)
 
 
 def _below(one: Shown) -> Array:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.review.plots import DEG, Array, Plot, Series, end, finite, level, span
 from harness.review.shown import ESTIMATE, GREY, TARGET, Shown
@@ -68,9 +69,10 @@ def _range_error_seen(estimating: Sequence[Shown], flights: Sequence[Shown]) -> 
         colour, name = _looks(one, "seen by the law", flights)
         names = (name,) if len(flights) > 1 else ("true", name)
         columns = ("range_error_seen",) if len(flights) > 1 else ("range_error", "range_error_seen")
-        values = np.column_stack([one.log[column] for column in columns])
+        new = _measured(one)
+        values = np.column_stack([one.log[column][new] for column in columns])
         colours = (TARGET, colour)[-len(names) :]
-        series.append(Series(names, colours, (one.width,) * len(names), one.log["time"], values))
+        series.append(Series(names, colours, (one.width,) * len(names), one.log["time"][new], values))
     title = (
         "Range error, true and as the law sees it [m]" if len(flights) == 1 else "Range error as the law sees it [m]"
     )
@@ -79,10 +81,18 @@ def _range_error_seen(estimating: Sequence[Shown], flights: Sequence[Shown]) -> 
     )
 
 
+def _measured(one: Shown) -> NDArray[np.bool_]:
+    """The rows with a new measurement; between them an estimate only goes on as it was."""
+    new = np.isfinite(one.log["innovation_range"])
+    new[:1] = True  # the filter starts from the first, which has no innovation
+    return new
+
+
 def _estimate(one: Shown, values: Array, variances: Array, label: str, flights: Sequence[Shown]) -> Series:
     colour, name = _looks(one, label, flights)
-    bands = variances[:, np.newaxis] if len(flights) <= _BANDS else None
-    return Series((name,), (colour,), (one.width,), one.log["time"], values[:, np.newaxis], bands)
+    bands = variances[_measured(one), np.newaxis] if len(flights) <= _BANDS else None
+    new = _measured(one)
+    return Series((name,), (colour,), (one.width,), one.log["time"][new], values[new, np.newaxis], bands)
 
 
 def _truth(column: str, flights: Sequence[Shown]) -> Series:
