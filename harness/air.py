@@ -15,10 +15,6 @@ def _calm() -> Array:
     return np.empty((0, 3))
 
 
-def _at_rest(span: float) -> Array:
-    return np.empty((0, 4))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Air:
     """Velocities of the air, m/s towards north, east, down, on a grid of steps: never the plant's or the law's own.
@@ -31,11 +27,7 @@ class Air:
     altitude: float = 0.0  # m: where the wind is the steady one
     step: float = math.inf  # s: of the grid
     gusts: Array = field(default_factory=_calm)  # (steps + 1, 3), beyond the steady wind
-    rotation: Callable[[float], Array] = _at_rest
-    """The air's rotation over a wing of this span (m), rad/s: (steps + 1, 4), or no row where it does not rotate.
-
-    Roll rate, pitch rate, and two parts of the yaw rate, which is east cos(yaw) - north sin(yaw): north, east.
-    """
+    turbulence: Callable[[float], Array] | None = None  # how its turbulence turns over a wing of this span, m
     _way: Array = field(init=False)  # (steps + 1, 2): how far they have carried since the start, north, east
 
     def __post_init__(self) -> None:
@@ -55,6 +47,13 @@ class Air:
         """The whole horizontal wind at the k-th step, at `altitude`; north, east."""
         (W_x, W_y), (gust_x, gust_y, _) = self.steady, self.gust(k)
         return W_x + gust_x, W_y + gust_y
+
+    def rotation(self, span: float) -> Array:
+        """The air's rotation over a wing of this span (m), rad/s: (steps + 1, 4).
+
+        Roll rate, pitch rate, and two parts of the yaw rate, which is east cos(yaw) - north sin(yaw): north, east.
+        """
+        return self.turbulence(span) if self.turbulence else np.zeros((len(self.gusts), 4))
 
     def drift(self, begin: int, end: int) -> tuple[float, float]:
         """How far, m, the gusts carry something that follows them at once, between two steps; north, east."""

@@ -43,10 +43,11 @@ class Wind:
     ] = (0.0, 0.0)
     gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; where they overlap, they add up")] = ()
     turbulence: Annotated[Literal["none", "light", "moderate", "severe"], About("MIL-F-8785C, low altitude")] = "none"
+    rotation: Annotated[bool, About("the turbulence also turns the air over a 6-DOF aircraft's wing")] = True
 
     def start(self, *, airspeed: float, altitude: float, step: float, duration: float, seed: int) -> Air:
         """The air of a flight at this nominal airspeed and altitude, on its grid of steps. SI."""
-        if self == Wind(steady=self.steady):
+        if self == Wind(steady=self.steady, rotation=self.rotation):
             return Air(steady=self.steady)
         steps = round(duration / step)
         time = step * np.arange(steps + 1, dtype=np.float64)
@@ -59,4 +60,6 @@ class Wind:
         W_x, W_y = self.steady
         model = dryden(self.turbulence, airspeed, altitude)
         field = turbulence(model, math.atan2(W_y, W_x), seed, step, steps)
-        return replace(air, gusts=gusts + field.velocity[field.lead :], rotation=field.rotation)
+        return replace(
+            air, gusts=gusts + field.velocity[field.lead :], turbulence=field.rotation if self.rotation else None
+        )

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -271,43 +271,33 @@ def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
 
     The aircraft started in trim in the horizontal air at the start, which JSBSim has as its steady wind.
     """
-    north, east, down = (
-        _node(fdm, f"atmosphere/gust-{axis}-fps").set_double_value for axis in ("north", "east", "down")
+    set_x, set_y, set_z, roll, pitch, yaw = (
+        _node(fdm, name).set_double_value
+        for name in (
+            *(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down")),
+            *(f"gust/{axis}-rad_sec" for axis in "pqr"),
+        )
     )
-    height = _node(fdm, "position/h-sl-ft").get_double_value
-    shear_north, shear_east = air.shear
-    level = air.altitude / FT
+    height, heading = (_node(fdm, name).get_double_value for name in ("position/h-sl-ft", "attitude/psi-rad"))
+    (shear_x, shear_y), level = air.shear, air.altitude / FT
     met_x, met_y, _ = air.gust(0)
-    rows = _rows((air.gusts - (met_x, met_y, 0.0)) / FT)
+    table = np.column_stack([(air.gusts - (met_x, met_y, 0.0)) / FT, air.rotation(FT * fdm["metrics/bw-ft"])])
+    blocks = (
+        table[k : k + 1000].tolist() for k in range(0, len(table), 1000)
+    )  # as lists they take four times the room
+    rows, sin, cos = chain.from_iterable(blocks), math.sin, math.cos
 
     def blow() -> None:
-        above = height() - level
-        W_x, W_y, W_z = next(rows)
-        north(W_x + shear_north * above)
-        east(W_y + shear_east * above)
-        down(W_z)
-
-    rotation = air.rotation(FT * fdm["metrics/bw-ft"])
-    if not len(rotation):
-        return blow
-    roll, pitch, yaw = (_node(fdm, f"gust/{axis}-rad_sec").set_double_value for axis in "pqr")
-    heading = _node(fdm, "attitude/psi-rad").get_double_value
-    rates = _rows(rotation)
-
-    def blow_and_turn() -> None:
-        blow()
-        psi = heading()
-        p, q, r_x, r_y = next(rates)
+        above, psi = height() - level, heading()
+        W_x, W_y, W_z, p, q, r_x, r_y = next(rows)
+        set_x(W_x + shear_x * above)
+        set_y(W_y + shear_y * above)
+        set_z(W_z)
         roll(p)
         pitch(q)
-        yaw(r_y * math.cos(psi) - r_x * math.sin(psi))
+        yaw(r_y * cos(psi) - r_x * sin(psi))
 
-    return blow_and_turn
-
-
-def _rows(table: NDArray[np.float64]) -> Iterator[list[float]]:
-    """The table's rows, a thousand at a time taken from it: lists of floats cost four times its room."""
-    return chain.from_iterable(table[k : k + 1000].tolist() for k in range(0, len(table), 1000))
+    return blow
 
 
 class _SixDofFlying:
