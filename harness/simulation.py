@@ -74,7 +74,14 @@ def completed(log: FlightLog, estimates: list[tuple[float, ...]] | None) -> Flig
 
 
 def observe(state: State, nominal_airspeed: float, wind: tuple[float, float], seen: TargetState) -> Observation:
-    """What the law gets to know: the aircraft's own state, the steady wind, the target as `seen`."""
+    """What the law gets to know: the aircraft's own state, the steady wind, the target as `seen`.
+
+    psi_a is measured alike on every plant, from ground velocity and steady wind. Where gusts blow that is not the
+    psi_a of Eq. (1), and a law that saw this one would miss how they carry the aircraft.
+    """
+    W_x, W_y = wind
+    if state.wind_north != W_x or state.wind_east != W_y:
+        state = state._replace(heading=math.atan2(state.velocity_east - W_y, state.velocity_north - W_x))
     return Observation._make((*state[:_OWN], nominal_airspeed, *wind, *seen))
 
 

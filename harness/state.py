@@ -10,7 +10,7 @@ class State(NamedTuple):
     """The aircraft at one moment. SI, rad; NED from the flight's origin; NaN where a plant has no such thing.
 
     `heading` is psi_a: of an airframe the direction of (ground velocity - steady wind); of a plant that gusts carry at
-    once the psi_a of Eq. (1), since its ground velocity jumps with each gust, as no aircraft's does. `yaw` is the nose.
+    once the psi_a of Eq. (1), while laws are shown what they would measure (`observe`). `yaw` is the nose.
     Aileron positive rolls right, elevator positive pitches down, rudder positive yaws left. Sideslip is positive with
     the wind from the right.
     """

@@ -13,7 +13,8 @@ from harness.flight import Flight, air_of, problems
 from harness.plant import Start
 from harness.plants.kinematic import Kinematic
 from harness.plants.sixdof import SixDof, wind_triangle_error
-from harness.simulation import simulate
+from harness.simulation import observe, simulate
+from harness.target import TargetState
 from harness.wind import Gust, Wind
 
 STICK = aircraft.folder("ultra_stick_25e")
@@ -63,6 +64,17 @@ def test_the_kinematic_aircraft_keeps_its_airspeed_and_heading_in_a_gust_and_mov
     assert (s.wind_north, s.wind_east, s.wind_down) == pytest.approx((3.0, -2.0, 1.0))
     assert s.velocity_north - s.wind_north == pytest.approx(13.0 * math.cos(0.3))
     assert s.velocity_east - s.wind_east == pytest.approx(13.0 * math.sin(0.3))
+
+
+def test_a_law_sees_the_direction_of_ground_velocity_less_steady_wind_on_every_plant() -> None:
+    for flying in (
+        Kinematic().start(Start(heading=0.3), air(WIND)),
+        SixDof(STICK, 0.005, True).start(Start(), air(WIND)),
+    ):
+        flying.advance(0.05, 1.5)
+        s = flying.state
+        seen = observe(s, 13.0, WIND.steady, TargetState(0.0, 0.0, 0.0, 0.0))
+        assert seen.heading == math.atan2(s.velocity_east - 2.0, s.velocity_north - 1.0)
 
 
 @pytest.mark.parametrize("name", aircraft.names())
