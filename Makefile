@@ -28,10 +28,9 @@ models: install  ## write the JSBSim models from the airframes' data
 identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name || exit 1; done
 
-bench: install  ## the speed of the loop, as ratios in one run, of --help, of recordings
+bench: install  ## the speed of the loop, as ratios in one run, and of --help
 	$(BIN)/python -m benchmarks.flight_speed
 	$(BIN)/python -m benchmarks.help_speed
-	$(BIN)/python -m benchmarks.recording_speed
 
 lock:  ## resolve the dependencies anew (needs uv)
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \

@@ -12,6 +12,7 @@ from harness.commands.export import export
 from harness.commands.fly import fly
 from harness.commands.identify import identify
 from harness.commands.list import list_
+from harness.commands.predict import predict
 from harness.commands.report import report
 from harness.commands.reproduce import reproduce
 from harness.commands.run import run
@@ -30,7 +31,22 @@ def harness() -> None:
     """
 
 
-for command in (fly, run, show, view, export, compare, report, check, list_, demo, reproduce, identify, doctor):
+for command in (
+    fly,
+    run,
+    show,
+    view,
+    export,
+    compare,
+    report,
+    check,
+    list_,
+    demo,
+    reproduce,
+    identify,
+    predict,
+    doctor,
+):
     harness.add_command(command)
 
 

@@ -29,8 +29,8 @@ START = Start(position=(5.0, -7.0), heading=0.3, airspeed=13.0)
 STILL = Air()
 NO_CHANGE = AirspeedHold(gain=0.0, frequency=1.0, damping=1.0)
 WHOLE = Response(
-    delay=0.022, frequency=9.0, damping=0.8, sideslip_frequency=2.6, sideslip_damping=0.33, zero_frequency=2.85,
-    zero_damping=0.27, tail_rate=0.3, tail_share=0.06,
+    delay=0.022, frequency=9.0, damping=0.8, lead=0.02, sideslip_frequency=2.6, sideslip_damping=0.33,
+    zero_frequency=2.85, zero_damping=0.27, tail_rate=0.3, tail_share=0.06,
 )  # fmt: skip
 
 

@@ -27,11 +27,11 @@ class Fitted(NamedTuple):
 
 
 _START = Response(
-    delay=0.02, frequency=10.0, damping=0.8, sideslip_frequency=4.0, sideslip_damping=0.6,
+    delay=0.02, frequency=10.0, damping=0.8, lead=0.01, sideslip_frequency=4.0, sideslip_damping=0.6,
     zero_frequency=4.2, zero_damping=0.7, tail_rate=0.5, tail_share=0.05,
 )  # fmt: skip
-_LOWEST = (0.0, 1.0, 0.2, 0.5, 0.2, 0.5, -2.0, 0.1, -0.5)
-_HIGHEST = (0.3, 60.0, 3.0, 60.0, 3.0, 100.0, 5.0, 3.0, 0.9)
+_LOWEST = (0.0, 1.0, 0.2, -0.2, 0.5, 0.2, 0.5, -2.0, 0.1, -0.5)
+_HIGHEST = (0.3, 60.0, 3.0, 0.5, 60.0, 3.0, 100.0, 5.0, 3.0, 0.9)
 _FIELDS = tuple(Response.__dataclass_fields__)
 
 

@@ -51,7 +51,7 @@ def told(found: Identification) -> Iterator[str]:
 
 def _response(r: Response) -> str:
     return (
-        f"delay {r.delay:.3f} s, {r.frequency:.3g} rad/s damping {r.damping:.2f}, sideslip {r.sideslip_frequency:.3g} "
-        f"rad/s damping {r.sideslip_damping:.2f} with zeros {r.zero_frequency:.3g} rad/s damping {r.zero_damping:.2f}, "
-        f"{100 * r.tail_share:.1f} % at {r.tail_rate:.2f} 1/s"
+        f"delay {r.delay:.3f} s, {r.frequency:.3g} rad/s damping {r.damping:.2f} lead {r.lead:.3f} s, sideslip "
+        f"{r.sideslip_frequency:.3g} rad/s damping {r.sideslip_damping:.2f} with zeros {r.zero_frequency:.3g} rad/s "
+        f"damping {r.zero_damping:.2f}, {100 * r.tail_share:.1f} % at {r.tail_rate:.2f} 1/s"
     )

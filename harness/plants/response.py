@@ -1,10 +1,11 @@
 """A linear response of gain one to a held and delayed command, and its exact motion between commands."""
 
+import math
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import mul
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from annotated_types import Ge, Gt, Lt
@@ -21,16 +22,17 @@ LONGEST = 50_000_000  # ns: a longer stretch is cut into equal pieces, for the n
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """A delay, the bank's second order, a sideslip mode with its zeros, and the slow tail that a trim leaves.
+    """A delay, the bank's second order with a zero, a sideslip mode with its zeros, and the slow tail a trim leaves.
 
-        exp(-delay s) * 1 / q(s; roll) * q(s; zeros) / q(s; sideslip) * (1 + (1 - tail_share) s / tail_rate) / (1 + s / tail_rate)
+        exp(-delay s) (1 + lead s) / q(s; bank) q(s; zero) / q(s; sideslip) (1 + (1 - share) s / rate) / (1 + s / rate)
 
-    with q(s; w, z) = 1 + 2 z s / w + (s / w)^2, frequencies in rad/s. Its gain is one.
-    """  # noqa: E501 - a formula
+    with q(s; w, z) = 1 + 2 z s / w + (s / w)^2 and the tail's share and rate. Its gain is one.
+    """
 
     delay: Annotated[Seconds, Ge(0), Lt(10), About("from the command to its first effect")]
     frequency: Annotated[float, Gt(0), About("rad/s: of the bank's second order")]
     damping: Annotated[float, Gt(0), About("of the bank's second order")]
+    lead: Annotated[Seconds, About("its zero: what comes at once, as the side force of a deflection")]
     sideslip_frequency: Annotated[float, Gt(0), About("rad/s: of the sideslip mode")]
     sideslip_damping: Annotated[float, Gt(0), About("of the sideslip mode")]
     zero_frequency: Annotated[float, Gt(0), About("rad/s: of the zeros that nearly cancel the sideslip mode")]
@@ -43,7 +45,7 @@ class Response:
         A, b, c = np.zeros((5, 5)), np.zeros(5), np.zeros(5)
         w, z = self.frequency, self.damping
         A[0, 1], A[1, :2], b[1] = 1.0, (-w * w, -2.0 * z * w), w * w
-        c[0] = 1.0
+        c[:2] = 1.0, self.lead
         w, z = self.sideslip_frequency, self.sideslip_damping
         w_0, z_0 = self.zero_frequency, self.zero_damping
         A[2, 3], A[3, 2:4] = 1.0, (-w * w, -2.0 * z * w)
@@ -61,7 +63,11 @@ class Response:
     def at(self, omega: Array) -> NDArray[np.complex128]:
         """The frequency response at these rad/s."""
         s = 1j * np.asarray(omega, dtype=float)
-        numerator = _q(s, self.zero_frequency, self.zero_damping) * (1.0 + (1.0 - self.tail_share) * s / self.tail_rate)
+        numerator = (
+            (1.0 + self.lead * s)
+            * _q(s, self.zero_frequency, self.zero_damping)
+            * (1.0 + (1.0 - self.tail_share) * s / self.tail_rate)
+        )
         denominator = (
             _q(s, self.frequency, self.damping)
             * _q(s, self.sideslip_frequency, self.sideslip_damping)
@@ -69,11 +75,45 @@ class Response:
         )
         return np.asarray(np.exp(-s * self.delay) * numerator / denominator)
 
+    def quicker(self, times: float) -> Self:
+        """The same response so many times as quick."""
+        return replace(
+            self,
+            delay=self.delay / times,
+            frequency=self.frequency * times,
+            lead=self.lead / times,
+            sideslip_frequency=self.sideslip_frequency * times,
+            zero_frequency=self.zero_frequency * times,
+            tail_rate=self.tail_rate * times,
+        )
+
+    @property
+    def bandwidth(self) -> float:
+        """Where the gain first falls through -3 dB, rad/s."""
+        omega = self.frequency * np.geomspace(1e-3, 1e3, 6001)
+        return float(omega[int(np.argmax(np.abs(self.at(omega)) < math.sqrt(0.5)))])
+
+    def sampled(self, period: float, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """From a command held for `period` to the output's integral, and to that one's, at its instants: (z's, 2)."""
+        A, b, c = self.matrices()
+        n = len(b)
+        system = np.zeros((n + 3, n + 3))
+        system[:n, :n], system[:n, -1], system[n, :n], system[n + 1, n] = A, b, c, 1.0
+        whole = math.floor(self.delay / period)
+        late = self.delay - whole * period
+        before, after = expm(system * late), expm(system * (period - late))
+        step = (after @ before)[:-1, :-1]
+        now, earlier = after[:-1, -1], after[:-1, :-1] @ before[:-1, -1]
+        drive = np.multiply.outer(z, now) + earlier  # times 1/z: of the command now and of the one before
+        left = z[:, np.newaxis, np.newaxis] * np.eye(n + 2) - step
+        return np.asarray(np.linalg.solve(left, drive[:, :, np.newaxis])[:, n:, 0] * z[:, np.newaxis] ** (-whole - 1))
+
 
 def plain(delay: float, frequency: float, damping: float) -> Response:
     """The second order alone, without sideslip or tail."""
     return Response(
-        delay=delay, frequency=frequency, damping=damping, sideslip_frequency=frequency, sideslip_damping=damping,
+        delay=delay, frequency=frequency, damping=damping, lead=0.0,
+        sideslip_frequency=frequency, sideslip_damping=damping,
         zero_frequency=frequency, zero_damping=damping, tail_rate=1.0, tail_share=0.0,
     )  # fmt: skip
 
@@ -108,7 +148,8 @@ class Motion:
         n = self._order = len(b)
         system = np.zeros((n + 2, n + 2))  # of the states, the output's integral, and the input
         system[:n, :n], system[:n, -1], system[n, :n] = A, b, c
-        self._system, self._output, self._slope = system, _row(c), _row(c @ A)
+        self._system, self._output = system, _row(c)
+        self._slope = (*_row(c @ A), float(c @ b))
         self._nodes = gauss(nodes)[0]
         self._pieces: dict[int, tuple[int, Piece]] = {}
         self._delay = round(response.delay * 1e9)
@@ -122,8 +163,8 @@ class Motion:
 
     @property
     def slope(self) -> float:
-        """The output's rate of change: the input does not enter, since output and input are two integrations apart."""
-        return dot(self._slope, self._states)
+        """The output's rate of change."""
+        return dot(self._slope, (*self._states, self._input))
 
     def pieces(self, command: float, period: float) -> Iterator[tuple[tuple[float, ...], Piece]]:
         """The next `period` seconds with this command given now: ((states, input) at its start, piece), one by one."""

@@ -1,0 +1,185 @@
+"""The limit cycle that a high-gain law falls into behind a lagging inner loop, predicted from the identified response.
+
+On its circle the aircraft turns at omega_0 = -v_a / R_d. The command u, held for a period T, makes the heading error e
+and the range error r, and the law makes the command of them:
+
+    e(z) = H(z) (u(z) - omega_0),   r(z) = v_a I(z) (u(z) - omega_0),   u = law(e, r)
+
+where H and I are the identified response's first and second integral at the sampling instants. A steady oscillation
+e = sum of E_m exp(i m omega t) has E_m = H(exp(i m omega T)) U_m for every harmonic m of u, and U_0 = omega_0: the turn
+biases the law, and a mean range error makes up for it. With one harmonic this is the biased describing function; with
+more it tends to the cycle of the sampled loop itself. The law is called as in flight: no gain of it is approximated.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from autopilot.guidance import Law, Observation
+from harness.plants.response import Response
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+HARMONICS = 15
+VISIBLE = math.radians(0.5)  # rad/s: a command that swings by less is not called a limit cycle
+_SAMPLES = 128  # of the cycle
+_SOLVED = 1e-6  # the largest imbalance of a solution, relative to the first harmonic
+_UNKNOWN = (math.nan, math.nan, math.nan)  # heading rate, bank and roll rate, which no law here asks for
+
+
+class LimitCycle(NamedTuple):
+    """A limit cycle on the circle. SI, rad; an amplitude is half of peak to peak."""
+
+    frequency: float  # Hz
+    heading_rate: float  # amplitude of its means over a period
+    command: float  # amplitude
+    range_mean: float
+    range_error: float  # amplitude
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A law on its circle behind an inner loop."""
+
+    law: Law
+    response: Response  # of the heading rate to its command
+    airspeed: float
+    period: float  # s, for which a command is held
+
+    @property
+    def turn(self) -> float:
+        """The heading rate of the circle in still air, the paper's way round. rad/s."""
+        return -self.airspeed / self.law.standoff
+
+    def commands(self, e: Array, r: Array) -> Array:
+        """The law's commands at these heading and range errors."""
+        law: Any = self.law
+        step = (replace(law, direction="paper") if hasattr(law, "direction") else law).start()
+        R_d, v_a = self.law.standoff, self.airspeed
+
+        def command(e: float, r: float) -> float:
+            psi = e - 0.5 * math.pi  # due north of the target, at the origin, the paper's circle goes west
+            own = (R_d + r, 0.0, v_a * math.cos(psi), v_a * math.sin(psi), v_a, psi, *_UNKNOWN, v_a)
+            return float(step(Observation._make((*own, *(0.0,) * 8))).heading_rate)
+
+        return np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)])
+
+
+class _Cycle(NamedTuple):
+    """An oscillation that may balance or not, over one turn of its phase."""
+
+    omega: float
+    e: Array
+    r: Array
+    u: Array
+    U: Complex  # harmonics of u from 0 on
+    imbalance: Array  # relative
+
+
+def _cycle(loop: Loop, x: Array) -> _Cycle:
+    """The oscillation x: logarithms of omega and E_1, mean r over v_a, then real and imaginary parts of E_m / E_1."""
+    higher = (len(x) - 3) // 2
+    m = np.arange(1, higher + 2)
+    omega = float(np.exp(x[0]))
+    E = np.exp(x[1]) * np.append(1.0, x[3 : 3 + higher] + 1j * x[3 + higher :])
+    H, I = loop.response.sampled(loop.period, np.exp(1j * m * omega * loop.period)).T  # noqa: E741 - as above
+    wave = np.exp(2j * math.pi * np.outer(np.arange(_SAMPLES), m) / _SAMPLES)
+    e = 2.0 * np.real(wave @ E)
+    r = loop.airspeed * (float(x[2]) + 2.0 * np.real(wave @ (E * I / H)))
+    u = loop.commands(e, r)
+    U = np.fft.fft(u)[: higher + 2] / _SAMPLES
+    off = (H * U[1:] - E) / abs(E[0])
+    bias = (U[0].real - loop.turn) / loop.turn
+    return _Cycle(omega, e, r, u, U, np.concatenate([[bias], off.real, off.imag]))
+
+
+def limit_cycle(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
+    """The predicted limit cycle; None when there is none by which the command swings by `VISIBLE` or more.
+
+    ValueError when the limit is below the heading rate of the circle, which then is not flown.
+    """
+    if loop.law.max_heading_rate <= abs(loop.turn):
+        raise ValueError("the circle cannot be held: the heading-rate limit is below what it takes")
+    gain, omega = critical_gain(loop.response, loop.period)
+    if math.isinf(gain):
+        return None
+    limit = min(loop.law.max_heading_rate, 10.0 * abs(loop.turn))
+    for slower in (1.0, 0.7, 0.5):
+        for amplitude in (0.5 * limit / gain, 0.05 * limit / gain):
+            x = _balanced(loop, np.array([math.log(slower * omega), math.log(amplitude), 0.0]), harmonics)
+            if x is not None:
+                return _told(loop, _cycle(loop, x))
+    return None
+
+
+def _balanced(loop: Loop, guess: Array, harmonics: int) -> Array | None:
+    """The oscillation that balances, first with one harmonic; None when none is found from this guess."""
+    for count in sorted({1, min(3, harmonics), min(7, harmonics), harmonics}):
+        found = _solved(lambda x: _cycle(loop, x).imbalance, _with_harmonics(guess, count))
+        if found is None:
+            return None
+        guess = found
+        if np.ptp(_cycle(loop, found).u) < VISIBLE:
+            break
+    return guess
+
+
+def _solved(imbalance: Callable[[Array], Array], x: Array) -> Array | None:
+    scale = np.append([1.0, 1.0], np.full(len(x) - 2, 0.1))
+    found = least_squares(imbalance, x, x_scale=scale, xtol=1e-10, max_nfev=40)
+    return np.asarray(found.x) if np.abs(found.fun).max() < _SOLVED else None
+
+
+def _with_harmonics(x: Array, count: int) -> Array:
+    """The same oscillation with so many harmonics, the new ones zero."""
+    known = (len(x) - 3) // 2
+    new = np.zeros(count - 1 - known)
+    return np.concatenate([x[:3], x[3 : 3 + known], new, x[3 + known :], new])
+
+
+def _told(loop: Loop, cycle: _Cycle) -> LimitCycle | None:
+    command = float(np.ptp(cycle.u)) / 2.0
+    if command < VISIBLE:
+        return None
+    spectrum = np.fft.rfft(cycle.e)
+    ahead = np.fft.irfft(spectrum * np.exp(1j * np.arange(len(spectrum)) * cycle.omega * loop.period), _SAMPLES)
+    return LimitCycle(
+        frequency=cycle.omega / math.tau,
+        heading_rate=float(np.ptp(ahead - cycle.e)) / loop.period / 2.0,
+        command=command,
+        range_mean=float(cycle.r.mean()),
+        range_error=float(np.ptp(cycle.r)) / 2.0,
+    )
+
+
+def critical_gain(response: Response, period: float) -> tuple[float, float]:
+    """The smallest gain, 1/s, from heading error to command at which the held loop oscillates, its rad/s; or inf."""
+    omega = math.pi / period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
+    H = response.sampled(period, np.exp(1j * omega * period))[:, 0]
+    crossing = np.flatnonzero((np.sign(H.imag[1:]) != np.sign(H.imag[:-1])) & (H.real[1:] < 0.0))
+    gains = [
+        (-1.0 / float(H.real[i + 1]), float(omega[i + 1])) for i in (*crossing, len(omega) - 2) if H.real[i + 1] < 0
+    ]
+    return min(gains, default=(math.inf, math.inf))
+
+
+def boundary(loop_at: Callable[[float], Loop], guess: float) -> float:
+    """The q > 0 at which the limit cycle of `loop_at(q)` makes the command swing by just `VISIBLE`; else NaN."""
+
+    def imbalance(x: Array) -> Array:
+        cycle = _cycle(loop_at(float(np.exp(x[3]))), x[:3])
+        return np.append(cycle.imbalance, math.log(max(2.0 * abs(cycle.U[1]), 1e-300) / VISIBLE))
+
+    for off in (1.0, 0.5, 2.0, 0.25, 4.0):
+        loop = loop_at(off * guess)
+        gain, omega = critical_gain(loop.response, loop.period)
+        x = _solved(imbalance, np.array([math.log(omega), math.log(0.5 * VISIBLE / gain), 0.0, math.log(off * guess)]))
+        if x is not None:
+            return float(np.exp(x[3]))
+    return math.nan
