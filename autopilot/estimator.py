@@ -53,6 +53,12 @@ class Estimator:
     kind: Annotated[
         Literal["truth", "ekf"], About("truth: the target's own state; ekf: as tracked by range and azimuth")
     ] = "truth"
+    acceleration: Annotated[
+        Literal["known", "unknown"], About("the target's, to a law that is told the truth; an ekf knows of none")
+    ] = "known"
+    turn_rate: Annotated[
+        Literal["known", "unknown"], About("the target's, to a law that is told the truth; an ekf knows of none")
+    ] = "known"
     period: Annotated[Seconds, Gt(0), Le(1e3), About("of the measurements, T_s")] = 0.5
     sensor_position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (0.0, 0.0)
     range_variance: Annotated[SquareMetres, Gt(0), About("of the measurement noise, P")] = 0.5

@@ -41,6 +41,12 @@ class Estimation:
         return TargetState(*estimate[:4])
 
 
+def told(estimator: Estimator) -> Callable[[TargetState], TargetState] | None:
+    """What a law that is told the truth does not get to know: it is zero to it. None when it is told everything."""
+    hidden = {f"target_{name}": 0.0 for name in ("acceleration", "turn_rate") if getattr(estimator, name) == "unknown"}
+    return (lambda truth: truth._replace(**hidden)) if hidden else None
+
+
 def sensor(estimator: Estimator, seed: int) -> Callable[[TargetState], Measurement]:
     """The estimator's sensor: range and azimuth of a target, with white Gaussian noise that the seed alone decides."""
     noise, position = stream(seed, "sensor"), estimator.sensor_position

@@ -7,7 +7,7 @@ from struct import Struct
 import numpy as np
 
 from autopilot.guidance import Guidance, Observation, Step
-from harness.estimation import Estimation
+from harness.estimation import Estimation, told
 from harness.flight import Flight, air_of, plant_of, problems
 from harness.flight_log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
 from harness.plant import End, Outcome
@@ -30,6 +30,7 @@ def simulate(flight: Flight, watch: Watch | None = None) -> FlightLog:
         raise ValueError(f"{problem.name}: {problem.message}")
     target, law = flight.target.start(), flight.law.start()
     estimation = Estimation(flight, target) if flight.estimator.kind == "ekf" else None
+    tell = told(flight.estimator)
     flying = plant_of(flight).start(flight.start, air_of(flight))
     period, last = flight.guidance_period, flight.periods
     wind, nominal_airspeed = flight.wind.steady, flight.start.airspeed
@@ -45,7 +46,7 @@ def simulate(flight: Flight, watch: Watch | None = None) -> FlightLog:
     try:
         for k in range(last + 1):
             state, truth = flying.state, target(k * period)
-            seen = estimation.at(k) if estimation else truth
+            seen = estimation.at(k) if estimation else tell(truth) if tell else truth
             guidance = command(law, observe(state, nominal_airspeed, wind, seen))
             row.pack_into(table, rows * stride, k * period, *state, *truth, *guidance)
             rows += 1

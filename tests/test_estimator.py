@@ -209,6 +209,18 @@ def test_the_law_sees_the_estimate_and_nothing_else_of_the_target() -> None:
     assert (np.abs(log["target_north"] - heard[:, 0]) > 1e-3).mean() > 0.9
 
 
+@pytest.mark.parametrize("acceleration", ["known", "unknown"])
+@pytest.mark.parametrize("turn_rate", ["known", "unknown"])
+def test_a_law_told_the_truth_may_be_left_without_acceleration_or_turn_rate(acceleration: str, turn_rate: str) -> None:
+    listening = Listening([])
+    log = simulate(flight(law=listening, estimator=Estimator(acceleration=acceleration, turn_rate=turn_rate)))
+    for name, known in (("target_acceleration", acceleration), ("target_turn_rate", turn_rate)):
+        heard = np.array([getattr(o, name) for o in listening.heard])
+        assert np.array_equal(heard, log[name] if known == "known" else np.zeros(len(log)))
+        assert log[name].any()
+    assert [o.target_velocity_north for o in listening.heard] == log["target_velocity_north"].tolist()
+
+
 def test_the_range_error_is_the_true_one_beside_what_the_law_saw() -> None:
     log = simulate(flight())
     for suffix, name in (("", "range_error"), ("_seen", "range_error_seen")):
