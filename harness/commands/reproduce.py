@@ -1,4 +1,4 @@
-"""`harness reproduce`: the paper's own simulations, flown anew."""
+"""`harness reproduce`: the paper's own simulations, flown anew, and its claims one by one."""
 
 from pathlib import Path
 
@@ -7,31 +7,42 @@ import click
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/paper"), show_default=True)
-def reproduce(out: Path) -> None:
-    """The paper's tables and figures beside ours: printed lines, and a page with the figures in OUT/paper.html.
+@click.option("--workers", type=click.IntRange(1, 64), default=None, help="Processes; the numbers do not depend on it.")
+def reproduce(out: Path, workers: int | None) -> None:
+    """The paper's numbers beside ours and its claims one by one: printed, and with the figures in OUT/paper.html.
+
+    OUT/claims.md is the ledger of the claims as a document. Takes two to five minutes.
 
     \b
     Example:
       harness reproduce --out out/paper
     """
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import MofNCompleteColumn, Progress
 
     from harness.commands.telling import writable, writable_folder
-    from harness.paper import reproduce as job
+    from harness.paper import job, ledger
+    from harness.paper import reproduce as numbers
+    from harness.paper.claims import CLAIMS
     from harness.paper.page import page
 
-    path = writable(writable_folder(out) / "paper.html")
+    folder = writable_folder(out)
+    html, document = writable(folder / "paper.html"), writable(folder / "claims.md")
     terminal = Console(stderr=True)
-    results = []
-    with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as progress:
-        flying = progress.add_task("flying the paper", total=len(job.NUMBERS))
-        for result in job.reproduce():
-            results.append(result)
-            progress.advance(flying)
+    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
+    with Progress(*columns, console=terminal, transient=True, disable=not terminal.is_terminal) as progress:
+        flying = progress.add_task("flying the paper", total=len(job.jobs()))
+        everything = job.everything(workers or job.workers(), lambda: progress.advance(flying))
+    for path, text in ((html, page(everything)), (document, ledger.markdown(CLAIMS, everything.findings))):
         partial = path.with_suffix(".partial")
-        partial.write_text(page(results), encoding="utf-8")
+        partial.write_text(text, encoding="utf-8")
         partial.replace(path)
-    for line in job.table(results):
+    for line in numbers.table(everything.numbers):
         click.echo(line)
-    click.echo(f"figures: {path}")
+    click.echo(f"\nRead differently ({numbers.VARIANTS_TOLD}):")
+    for line in numbers.moved(everything.numbers):
+        click.echo(line)
+    click.echo("\nThe claims:")
+    for line in ledger.told(CLAIMS, everything.findings):
+        click.echo(line)
+    click.echo(f"\nfigures and claims: {html}\nclaims: {document}")

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from autopilot.estimator import Estimator
 from harness.estimation import sensor
-from harness.paper.reproduce import EXPERIMENTS
+from harness.paper.experiments import EXPERIMENTS
 from harness.randomness import stream
 from harness.target import Segment, Target, TargetState
 

@@ -10,10 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from harness.flight_log import FlightLog
+from harness.paper.experiments import Trace
 
 Array = NDArray[np.float64]
-Logs = Mapping[str, FlightLog]
+Curve = tuple[Array, Array]
+Sketch = Mapping[str, Curve]  # by the name of a column, over time, or of a path
+Sketches = Mapping[str, Sketch]  # by the law
+
+LAWS_DRAWN = ("NFTSM", "SMC", "NFTSM_1")
 
 COLOURS = MappingProxyType({"NFTSM": "#1f5fa8", "SMC": "#3a9a4b", "NFTSM_1": "#e08020", "target": "#c03030"})
 _MOST_POINTS = 1500  # of a curve: more cannot be seen
@@ -60,38 +64,56 @@ def _fast_terminal(x0: float, alpha2: float, beta2: float, t: Array) -> Array:
     return np.asarray(solve_ivp(slope, (0.0, t[-1]), [x0], t_eval=t, rtol=1e-8, atol=1e-10).y[0])
 
 
-def paths(figure: Figure, cases: Mapping[str, Logs]) -> None:
+def sketch(log: Trace) -> Sketch:
+    """What the figures show of a flight."""
+    time, v_x, v_y = log["time"], log["target_velocity_north"], log["target_velocity_east"]
+    over_time = {
+        "r": log["range_error"],
+        "s": log["sliding_variable"],
+        "rate": np.degrees(log["heading_rate_command"]),
+        "heading": np.degrees(log["heading"]),
+        "target speed": np.hypot(v_x, v_y),
+        "target heading": np.degrees(np.unwrap(np.arctan2(v_y, v_x))),
+    }
+    return {
+        **{name: _thin(time, values) for name, values in over_time.items()},
+        "path": _thin(log["north"], log["east"]),
+        "target path": _thin(log["target_north"], log["target_east"]),
+    }
+
+
+def paths(figure: Figure, cases: Mapping[str, Sketches]) -> None:
     """The ways of aircraft and target, one panel per case."""
-    for axes, (title, logs) in zip(_row(figure, len(cases)), cases.items(), strict=True):
-        for label, log in logs.items():
-            axes.plot(*_thin(log["north"], log["east"]), color=COLOURS[label], lw=1, label=label)
-        target = next(iter(logs.values()))
-        axes.plot(*_thin(target["target_north"], target["target_east"]), ".-", color=COLOURS["target"], lw=1, ms=2)
+    for axes, (title, laws) in zip(_row(figure, len(cases)), cases.items(), strict=True):
+        for label, drawn in laws.items():
+            axes.plot(*drawn["path"], color=COLOURS[label], lw=1, label=label)
+        axes.plot(*laws["SMC"]["target path"], ".-", color=COLOURS["target"], lw=1, ms=2, label="target")
         axes.set(title=title, xlabel="x [m]", ylabel="y [m]", aspect="equal")
         axes.legend()
 
 
-def columns(figure: Figure, cases: Mapping[str, Logs], shown: Mapping[str, tuple[str, float]]) -> None:
-    """Columns of the log over time: a panel per case and column; `shown` maps a column to its label and scale."""
+def over_time(
+    figure: Figure, cases: Mapping[str, Sketches], shown: Mapping[str, tuple[str, str, tuple[float, float] | None]]
+) -> None:
+    """Quantities over time: a panel per case and row; `shown` maps a row to quantity, label and limits."""
     grid = figure.subplots(len(shown), len(cases), sharex="col", squeeze=False)
-    for j, (title, logs) in enumerate(cases.items()):
-        for i, (column, (label, scale)) in enumerate(shown.items()):
-            for name, log in logs.items():
-                grid[i, j].plot(*_thin(log["time"], scale * log[column]), color=COLOURS[name], lw=0.9, label=name)
-            grid[i, j].set(ylabel=label)
+    for j, (title, laws) in enumerate(cases.items()):
+        for i, (quantity, label, limits) in enumerate(shown.values()):
+            for name, drawn in laws.items():
+                grid[i, j].plot(*drawn[quantity], color=COLOURS[name], lw=0.9, label=name)
+            grid[i, j].set(ylabel=label, ylim=limits)
         grid[0, j].set(title=title)
-        grid[0, j].legend()
+        grid[0, j].legend(loc="upper right")
         grid[-1, j].set(xlabel="t [s]")
 
 
-def target_profile(figure: Figure, log: FlightLog) -> None:
+def target_profile(figure: Figure, drawn: Sketch) -> None:
     """Figure 9a: the target's speed and heading."""
     left, right = figure.subplots(1, 2)
-    v_x, v_y = log["target_velocity_north"], log["target_velocity_east"]
-    left.plot(*_thin(log["time"], np.hypot(v_x, v_y)), color=COLOURS["target"])
-    left.set(title="Figure 9a: the target's speed", xlabel="t [s]", ylabel="v_t [m/s]")
-    right.plot(*_thin(log["time"], np.degrees(np.unwrap(np.arctan2(v_y, v_x)))), color=COLOURS["target"])
-    right.set(title="and heading", xlabel="t [s]", ylabel="ψ_t [deg]")
+    left.plot(*drawn["target speed"], color=COLOURS["target"])
+    left.set(title="Speed", xlabel="t [s]", ylabel="v_t [m/s]")
+    right.plot(*drawn["target heading"], color=COLOURS["target"])
+    right.set(title="Heading", xlabel="t [s]", ylabel="ψ_t [deg]")
 
 
 def _row(figure: Figure, count: int) -> Iterator[Axes]:

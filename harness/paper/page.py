@@ -1,58 +1,76 @@
-"""The page of `harness reproduce`: the numbers, and the figures in the paper's axes, in one file without a network."""
+"""The page of `harness reproduce`: numbers, figures in the paper's axes, claims, in one file without a network."""
 
-import math
 from functools import partial
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from harness.flight_log import FlightLog
 from harness.paper import figures
-from harness.paper.reproduce import EXPERIMENTS, VARIANTS, Reproduced, flown, shown
+from harness.paper.claims import CLAIMS
+from harness.paper.experiments import EXPERIMENTS
+from harness.paper.figures import LAWS_DRAWN, Sketch
+from harness.paper.job import Part, Sketches
+from harness.paper.ledger import COLUMNS, Verdict, cells, counts
+from harness.paper.reproduce import VARIANTS, VARIANTS_TOLD, shown
 
-_DEG = math.degrees(1.0)
-_ERRORS = {"range_error": ("r [m]", 1.0), "sliding_variable": ("s [rad]", 1.0)}
-_FIGURE_10 = {
-    "range_error": ("r [m]", 1.0),
-    "heading_rate_command": ("ω_ψ [deg/s]", _DEG),
-    "heading": ("ψ_a [deg]", _DEG),
-}
-_RATES = {"heading_rate_command": ("ω_ψ [deg/s]", _DEG), "heading": ("ψ_a [deg]", _DEG)}
+_R, _S = ("r", "r [m]", None), ("s", "s [rad]", None)
+_RATE, _HEADING = ("rate", "ω_ψ [deg/s]", None), ("heading", "ψ_a [deg]", None)
 
 
-def page(results: list[Reproduced]) -> str:
+def page(everything: Part) -> str:
     """The HTML page."""
-    environment = Environment(loader=PackageLoader("harness.paper", "."), autoescape=True, undefined=StrictUndefined)
+    environment = Environment(
+        loader=PackageLoader("harness.paper", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return environment.get_template("page.html.jinja").render(
-        results=results, variants=list(VARIANTS), shown=shown, figures=_figures()
+        results=everything.numbers,
+        agreeing=sum(result.agrees for result in everything.numbers),
+        variants=list(VARIANTS),
+        variants_told=VARIANTS_TOLD,
+        shown=shown,
+        experiments=EXPERIMENTS.values(),
+        figures=_figures(everything.sketches),
+        claims=CLAIMS,
+        columns=COLUMNS,
+        cells=partial(cells, findings=everything.findings),
+        counts=counts(everything.findings),
+        verdicts=list(Verdict),
     )
 
 
-def _figures() -> dict[str, str]:
+def _figures(sketches: Sketches) -> dict[str, str]:
     """Caption to SVG."""
-    s_shape = {EXPERIMENTS["S, whole"].title: _logs("S, whole")}
-    manoeuvring = _logs("manoeuvres")
-    stationary = {EXPERIMENTS[e].title: _logs(e) for e in ("30", "130")}
+
+    def case(experiment: str) -> dict[str, dict[str, Sketch]]:
+        return {EXPERIMENTS[experiment].title: {law: sketches[experiment, law] for law in LAWS_DRAWN}}
+
+    stationary, s_shape, manoeuvring = {**case("30"), **case("130")}, case("S"), case("manoeuvres")
+    errors, rates = {"r": _R, "s": _S}, {"rate": _RATE, "heading": _HEADING}
+    near = {"r": _R, "near": ("r", "r, near [m]", (-25.0, 25.0)), **rates}
+    draw, over_time = figures.draw, figures.over_time
     return {
-        "Figures 2 and 3": figures.draw(figures.terminal_modes),
-        "Figure 4: paths round a stationary target": figures.draw(partial(figures.paths, cases=stationary), height=4.4),
-        "Figure 5: distance error and sliding variable": figures.draw(
-            partial(figures.columns, cases=stationary, shown=_ERRORS), height=5.0
+        "Figures 2 and 3. Terminal and fast terminal sliding modes.": draw(figures.terminal_modes),
+        "Figure 4. Paths round a stationary target.": draw(partial(figures.paths, cases=stationary), height=4.4),
+        "Figure 5. Distance error and sliding variable, stationary target.": draw(
+            partial(over_time, cases=stationary, shown=errors), height=5.0
         ),
-        "Figure 6: heading rate and heading": figures.draw(
-            partial(figures.columns, cases=stationary, shown=_RATES), height=5.0
+        "Figure 6. Heading rate and heading, stationary target.": draw(
+            partial(over_time, cases=stationary, shown=rates), height=5.0
         ),
-        "Figure 7: paths round a target in an S": figures.draw(partial(figures.paths, cases=s_shape), height=4.4),
-        "Figure 8: distance error, round the S": figures.draw(partial(figures.columns, cases=s_shape, shown=_ERRORS)),
-        "Figure 9a: the manoeuvring target": figures.draw(partial(figures.target_profile, log=manoeuvring["SMC"])),
-        "Figure 9b: paths round the manoeuvring target": figures.draw(
-            partial(figures.paths, cases={EXPERIMENTS["manoeuvres"].title: manoeuvring}), height=4.4
+        "Figure 7. Paths round a target in an S; its shape is ours, the paper gives none.": draw(
+            partial(figures.paths, cases=s_shape), height=4.4
         ),
-        "Figure 10: distance error, heading rate and heading round the manoeuvring target": figures.draw(
-            partial(figures.columns, cases={EXPERIMENTS["manoeuvres"].title: manoeuvring}, shown=_FIGURE_10), height=6.0
+        "Figure 8. Distance error and sliding variable, round the S.": draw(
+            partial(over_time, cases=s_shape, shown=errors), height=5.0
+        ),
+        "Figure 9a. The manoeuvring target.": draw(
+            partial(figures.target_profile, drawn=sketches["manoeuvres", "SMC"]), height=2.6
+        ),
+        "Figure 9b. Paths round the manoeuvring target.": draw(partial(figures.paths, cases=manoeuvring), height=5.0),
+        "Figure 10. Distance error (whole and near), heading rate, heading, round the manoeuvring target.": draw(
+            partial(over_time, cases=manoeuvring, shown=near), height=7.5
         ),
     }
-
-
-def _logs(experiment: str) -> dict[str, FlightLog]:
-    reading = EXPERIMENTS[experiment].reading
-    return {label: flown(experiment, label, reading) for label in ("NFTSM", "SMC", "NFTSM_1")}

@@ -23,6 +23,16 @@ def ftsm_time(x0: float, alpha2: float, beta2: float, alpha3: float, beta3: floa
     return float(abs(x0) ** (1.0 - beta3) / (alpha3 * (1.0 - beta3)) * hyp2f1(1.0, q, 1.0 + q, -ratio))
 
 
+def printed_ftsm_time(x0: float, alpha2: float, beta2: float, alpha3: float, beta3: float) -> float:
+    """Remark 4 as printed, its stray k read as 1. Negative for beta2 > 1: it lacks its limit at 0."""
+    from scipy.special import hyp2f1
+
+    q = (beta2 - 1.0) / (beta2 - beta3)
+    z = -alpha3 / alpha2 * abs(x0) ** (beta3 - beta2)
+    front = abs(x0) ** (1.0 - beta2) / (1.0 - beta2) * alpha2 ** ((1.0 - beta2) / beta2)
+    return float(front * hyp2f1(1.0, q, 1.0 + q, z))
+
+
 def reaching_time(g: Nftsm, s0: float) -> float:
     """Eq. (25): when the reaching law brings s from s0 to 0, s, without a limit. The bound is the time itself."""
     V1 = 0.5 * s0 * s0

@@ -1,0 +1,267 @@
+"""What the paper claims of its law in flight, Sections 1 to 3, and its sampling: asked of a column's flights."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from autopilot.laws import law
+from autopilot.nftsm import Nftsm
+from harness.flight import problems
+from harness.metrics import metrics
+from harness.paper.claims_of_the_manifold import inner_rate, manifold
+from harness.paper.experiments import LAWS, STRAIGHT, Reading, flight, own
+from harness.paper.ledger import Column, Finding, holds, holds_if, metres, within
+from harness.paper.measures import azimuth, peak, rms, settled, turns
+from harness.paper.theory import longest_stable_period, reaching_time
+from harness.simulation import simulate
+from harness.target import Target
+from harness.wind import Wind
+
+_STEP = 0.005  # s
+
+
+# Abstract, introduction, Section 2
+
+
+def circles_a_moving_target(on: Column) -> Finding:
+    """NFTSM round the S, until 330 s."""
+    log = on.paper("S", "NFTSM", duration=330.0)
+    time = settled(log, 1.0)
+    return holds(
+        time is not None and turns(log, time) > 1.0,
+        f"within 1 m of the circle round the S {'never' if time is None else f'from {time:g} s on'}, "
+        f"{turns(log, time or 100.0):.1f} turns till 330 s, r "
+        f"{metres(rms(log, 100.0))} rms after 100 s",
+    )
+
+
+def smc_takes_for_ever(on: Column) -> Finding:
+    """The traditional law, 400 s round a stationary target."""
+    log = on.paper("30", "SMC", Reading(period=0.005), 400.0)
+    at = [abs(float(log["range_error"][np.searchsorted(log["time"], t)])) for t in (100.0, 200.0, 300.0, 400.0)]
+    return holds(at[-1] > 0.0, "|r| " + ", ".join(f"{x:.2g}" for x in at) + " m after 100, 200, 300, 400 s")
+
+
+def tracks_its_commands(on: Column) -> Finding:
+    """NFTSM from 30 deg: heading rate, airspeed, altitude."""
+    found = metrics(simulate(on.change(flight("30", "NFTSM", Reading(period=0.05)))))
+    rate, speed, height = (
+        found[name] or 0.0
+        for name in ("heading_rate_error_rms_deg_s", "airspeed_deviation_rms_mps", "altitude_deviation_peak_m")
+    )
+    return holds(
+        rate < 0.25 and speed < 0.13 and height < 2.0,
+        f"heading rate {rate:.2g} deg/s rms off, airspeed {speed:.2g} m/s rms, altitude {height:.2g} m at the most "
+        "(allowed: 0.25, 0.13, 2)",
+    )
+
+
+def flies_by_course(on: Column) -> Finding:
+    """NFTSM in 3.6 m/s of wind, by heading and by course, limited to 10 deg/s."""
+    one = replace(own("NFTSM", Target(), 100.0, 10.0), wind=Wind(steady=(3.0, 2.0)))
+    by_course = replace(one, law=law(*LAWS["NFTSM"], max_heading_rate=math.radians(10.0), command="course_rate"))
+    times = [settled(on.fly(each), 1.0) for each in (one, by_course)]
+    return holds(
+        times[1] is not None,
+        f"in 3.6 m/s of wind within 1 m {within(times[1])} by ground speed and course, {within(times[0])} by "
+        "airspeed and heading",
+    )
+
+
+def _straight(speed: float) -> Target:
+    return replace(STRAIGHT, speed=speed)
+
+
+def _held(on: Column, speed: float, limit_deg_s: float) -> bool:
+    return peak(on.fly(own("NFTSM", _straight(speed), 300.0, limit_deg_s)), 200.0) < max(1.0, on.tolerance)
+
+
+def remark_1_is_enough(on: Column) -> Finding:
+    """The fastest straight target round which NFTSM keeps within 1 m, to 0.1 m/s, with the limit and without."""
+    found = []
+    for limit in (5.0, math.inf):
+        low, high = 0, 130  # tenths of a metre per second
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if _held(on, middle / 10.0, limit) else (low, middle)
+        found.append(low / 10.0)
+    bound = math.sqrt(math.radians(5.0) * 13.0 * 200.0) - 13.0
+    return holds_if(
+        "the limit allows (v_a + w)²/(v_a R_d)",
+        found[1] > found[0] > 0.0,
+        f"within 1 m of the circle up to v_t = {found[0]:.1f} m/s at 5 deg/s (the formula: {bound:.2f}), up to "
+        f"{found[1]:.1f} of 13 m/s without a limit"
+        if found[0]
+        else "never within 1 m of the circle, at rest neither",
+    )
+
+
+def faster_target_flees(on: Column) -> Finding:
+    """A target at 13.5 m/s."""
+    log = on.fly(own("NFTSM", _straight(13.5), 600.0))
+    away = [float(log["range_error"][np.searchsorted(log["time"], t)]) for t in (200.0, 400.0, 600.0)]
+    return holds(
+        away[2] > away[1] > away[0],
+        "r " + ", ".join(f"{x:.0f}" for x in away) + " m after 200, 400, 600 s at v_t = 13.5 m/s",
+    )
+
+
+def definition_1(on: Column) -> Finding:
+    """The three conditions: r and r' at the end, and for how long r r' > 0, from both starts."""
+    told, fine = [], []
+    for experiment, label in (("30", "NFTSM"), ("30", "NFTSM_1"), ("130", "NFTSM")):
+        log = on.paper(experiment, label)
+        r, time = log["range_error"], log["time"]
+        r_dot = np.gradient(r, time)
+        away = float(np.mean((r * r_dot > 0.0) & (np.abs(r) > on.tolerance))) * float(time[-1])
+        fine.append(away < 0.1 and abs(r[-1]) < on.tolerance)
+        told.append(
+            f"{label} from {experiment}°: r {metres(abs(r[-1]))}, ṙ {metres(abs(r_dot[-1]))}/s at the end, r ṙ "
+            f"> 0 for {away:.1f} s"
+        )
+    return holds_if("there is no overshoot and the start is not turned away", fine[0] and not fine[2], "; ".join(told))
+
+
+# Section 3
+
+
+def goes_round(on: Column) -> Finding:
+    """The azimuth of a slow target: does it go one way?"""
+    log = on.paper("S", "NFTSM", duration=330.0)
+    rate = np.diff(azimuth(log)[log["time"] > 100.0])
+    return holds(bool((rate < 0.0).all()), f"{turns(log, 100.0):.2f} turns in 230 s round 2 m/s, never back")
+
+
+def follows_behind(on: Column) -> Finding:
+    """A target at 11 m/s, straight, without a limit: how the aircraft goes round it."""
+    log = on.fly(own("NFTSM", _straight(11.0), 700.0))
+    late = log["time"] > 200.0
+    seen = np.degrees(azimuth(log)[late]) + 45.0  # from the target's heading; clockwise
+    rate = np.abs(np.gradient(seen, log["time"][late]))
+    behind = np.abs(np.mod(seen - 180.0 + 180.0, 360.0) - 180.0) < 45.0
+    slowest = float(np.mod(seen[int(np.argmin(rate))] + 180.0, 360.0) - 180.0)
+    round_ = turns(log, 200.0)
+    return holds(
+        round_ < 0.5,
+        f"at 11 of 13 m/s it goes on circling: once round in {500.0 / round_:.0f} s, slowest ({rate.min():.2f} deg/s) "
+        f"at {slowest:.0f}° from the target's heading (90° is abeam), fastest ({rate.max():.1f}); within 45° "
+        "of straight "
+        f"behind {100.0 * behind.mean():.0f} % of the time",
+    )
+
+
+def v1_falls(on: Column) -> Finding:
+    """V1 = s^2/2 along the paper's flights, free and at the limit."""
+    told, free_fine, limited_fine = [], True, True
+    for experiment, label in (("30", "NFTSM"), ("130", "NFTSM"), ("30", "NFTSM_1")):
+        log = on.paper(experiment, label)
+        V1, period = 0.5 * log["sliding_variable"] ** 2, log.flight.guidance_period
+        free = np.abs(log["unlimited_command"][:-1]) < log.flight.law.max_heading_rate
+        rises = (np.diff(V1) > 0.0) & (V1[:-1] > 1e-12)
+        while_free, at_limit = period * (rises & free).sum(), period * (rises & ~free).sum()
+        free_fine, limited_fine = free_fine and not while_free, limited_fine and not at_limit
+        told.append(f"{label} from {experiment}° {while_free:.2g} s while free, {at_limit:.2g} s at the limit")
+    number = "V1 rises: " + ", ".join(told)
+    if free_fine and not limited_fine:
+        return holds_if("the command is not at its limit", True, number)
+    return holds(free_fine, number)
+
+
+def eq_25_bounds_the_flight(on: Column) -> Finding:
+    """When |s| is down to 1e-3 rad, against Eq. (25), without a limit and with the paper's."""
+    told: list[str] = []
+    times, bound = [], 0.0
+    for limit in (math.inf, 5.0):
+        log = on.fly(own("NFTSM", Target(), 60.0, limit, 0.001 if on.tolerance < 1e-3 else 0.05))
+        s = np.abs(log["sliding_variable"])
+        beyond = np.flatnonzero(s > 1e-3)
+        times.append(math.inf if s[-1] > 1e-3 else float(log["time"][beyond[-1]]))
+        steering = log.flight.law
+        assert isinstance(steering, Nftsm)
+        bound = reaching_time(steering, float(s[0]))
+        told.append(
+            f"{'never' if math.isinf(times[-1]) else f'{times[-1]:.2f} s'} "
+            f"{'at 5 deg/s' if told else 'without a limit'}"
+        )
+    return holds_if(
+        "there is no limit",
+        times[0] <= bound < times[1],
+        f"the bound is {bound:.2f} s; |s| is below 1e-3 after " + ", ".join(told),
+    )
+
+
+def reaches_zero(on: Column) -> Finding:
+    """Theorem 1 in flight: the way from 10 mm to 1e-6 m."""
+    log = on.fly(own("NFTSM", Target(), 60.0, 5.0, 0.001 if on.tolerance < 1e-3 else 0.05))
+    r, time = np.abs(log["range_error"]), log["time"]
+    falling = (r < 1e-3) & (r > 1e-5)
+    g = log.flight.law
+    assert isinstance(g, Nftsm)
+    if falling.sum() < 10 or r[-1] > 1e-3:
+        return holds(False, f"r is {rms(log, 40.0):.2g} m rms from 40 s on")
+    rate = -float(np.polyfit(time[falling], np.log(r[falling]), 1)[0])
+    return holds_if(
+        "zero means a tolerance", abs(rate / inner_rate(g) - 1.0) < 0.05,
+        f"inside η r falls as e^(−{rate:.2f} t) ({inner_rate(g):.2f} by the manifold's slope): 1e-4 m "
+        f"{within(settled(log))}, never zero",
+    )  # fmt: skip
+
+
+# Section 4
+
+
+def sampling(on: Column, label: str) -> Finding:
+    """The longest guidance period at which the law converges from 30 deg, in whole steps: 5 ms to 0.5 s, then 0.5 s."""
+    duration, last = (600.0, 40) if label == "SMC" else (80.0, 4)
+    periods = [n * _STEP for n in range(1, 101)] + [0.5 * n for n in range(2, last + 1)]
+    converged: dict[float, list[bool]] = {1.0: [], 1e-4: []}
+    for period in list(periods):
+        length = period * round(duration / period)
+        one = replace(flight("30", label), guidance_period=period, step=_STEP, duration=length)
+        if problems(on.change(one)):  # the column's measurements do not fit the period
+            periods.remove(period)
+            continue
+        log = on.fly(one)
+        late = np.abs(log["range_error"][log["time"] >= 0.9 * length])
+        for tolerance, each in converged.items():
+            each.append(bool(late.max() < tolerance))
+    told, steering = [], flight("30", label).law
+    for tolerance, each in converged.items():
+        gapless = each.index(False) if False in each else len(each)
+        text = (
+            f"to {tolerance:g} m up to {_period(periods[gapless - 1])}"
+            if gapless
+            else f"to {tolerance:g} m not at 5 ms"
+        )
+        if any(each[gapless:]):
+            text += f" and, with gaps, {_period(max(p for p, fine in zip(periods, each, strict=True) if fine))}"
+        if isinstance(steering, Nftsm):
+            bound = longest_stable_period(steering, manifold(steering, math.atan(steering.k1 * tolerance))[0])
+            text += f" (bound from k2 and k3: {1000.0 * bound:.0f} ms)"
+        told.append(text)
+    return holds(converged[1.0][periods.index(0.5)], f"from 30° it converges {'; '.join(told)}")
+
+
+def _period(seconds: float) -> str:
+    return f"{1000.0 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:g} s"
+
+
+def nftsm_sampling(on: Column) -> Finding:
+    """NFTSM with the identified gains."""
+    return sampling(on, "NFTSM")
+
+
+def nftsm_1_sampling(on: Column) -> Finding:
+    """NFTSM_1."""
+    return sampling(on, "NFTSM_1")
+
+
+def printed_sampling(on: Column) -> Finding:
+    """NFTSM with the gains of Table 2."""
+    return sampling(on, "NFTSM as printed")
+
+
+def smc_sampling(on: Column) -> Finding:
+    """The traditional law."""
+    return sampling(on, "SMC")

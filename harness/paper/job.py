@@ -1,0 +1,89 @@
+"""All that `harness reproduce` computes, in parts that any number of processes may share."""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import NamedTuple
+
+from harness.paper.claims import CLAIMS
+from harness.paper.experiments import EXPERIMENTS, flight, flown
+from harness.paper.figures import LAWS_DRAWN, Sketch, sketch
+from harness.paper.ledger import COLUMNS, Finding, Findings, decided
+from harness.paper.reproduce import Number, Reproduced, by_flight, in_order, reproduced
+
+Sketches = Mapping[tuple[str, str], Sketch]  # by experiment and law
+
+
+class Part(NamedTuple):
+    """Some of what is computed, or all of it."""
+
+    numbers: list[Reproduced]
+    sketches: Sketches
+    findings: Findings
+
+
+Job = Callable[[], Part]
+
+
+def jobs() -> list[Job]:
+    """What there is to compute, the longest first."""
+    sections = sorted(CLAIMS, key=lambda title: not title.startswith("4"))
+    return [
+        *(partial(_flown_claims, title, i) for title in reversed(sections) for i in reversed(range(len(COLUMNS)))),
+        *(partial(_numbers, numbers) for numbers in reversed(by_flight())),
+        *(partial(_sketched, experiment, law) for experiment in EXPERIMENTS for law in LAWS_DRAWN),
+        _theory,
+    ]
+
+
+def _numbers(numbers: tuple[Number, ...]) -> Part:
+    return Part(reproduced(numbers), {}, {})
+
+
+def _sketched(experiment: str, law: str) -> Part:
+    return Part([], {(experiment, law): sketch(flown(flight(experiment, law)))}, {})
+
+
+def _flown_claims(title: str, column: int) -> Part:
+    return Part([], {}, decided(CLAIMS[title], COLUMNS[column]))
+
+
+def _theory() -> Part:
+    return Part([], {}, decided([claim for claims in CLAIMS.values() for claim in claims], None))
+
+
+def everything(workers: int, done: Callable[[], None] = lambda: None) -> Part:
+    """All parts together, the same for any number of workers; `done` is called after each."""
+    numbers: list[Reproduced] = []
+    sketches: dict[tuple[str, str], Sketch] = {}
+    findings: dict[tuple[str, str], Finding] = {}
+    for part in _computed(jobs(), workers):
+        numbers += part.numbers
+        sketches.update(part.sketches)
+        findings.update(part.findings)
+        done()
+    return Part(in_order(numbers), sketches, findings)
+
+
+def _computed(todo: list[Job], workers: int) -> Iterator[Part]:
+    if workers == 1:
+        yield from (job() for job in todo)
+        return
+    with multiprocessing.get_context("spawn").Pool(workers, _deaf) as pool:  # leaving it ends its processes
+        yield from pool.imap_unordered(_done, todo)
+
+
+def _done(job: Job) -> Part:
+    return job()
+
+
+def _deaf() -> None:
+    """A worker leaves Ctrl-C to its parent, which ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def workers() -> int:
+    """Two, or what the machine has."""
+    return min(2, os.cpu_count() or 1)
