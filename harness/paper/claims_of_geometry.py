@@ -95,7 +95,7 @@ def estimator_consistent() -> Finding:
         "the start is known, or near the sensor",
         fits[0] and not fits[1],
         f"over 200 seeds, 1 km from the sensor: {cells[0]} from a known start (4 and 2 are right), {cells[1]} from the "
-        "first measurement; more cases in [estimator.md](estimator.md)",
+        "first measurement; more cases in docs/estimator.md",
     )
 
 
@@ -209,6 +209,20 @@ def remark_2_equivalence() -> Finding:
     )
 
 
+def arctan_manifold() -> Finding:
+    """Eq. (9), (10): r r' on psi_a = psi_a^d - arctan(c r), for every c at once: over all values of the arctan."""
+    angles, targets = np.linspace(0.0, 0.5 * math.pi, 91)[1:-1], np.linspace(-0.5 * math.pi, 0.5 * math.pi, 91)
+    # where r > 0 does not fall
+    wrong = [(d - f, d) for f in angles for d in targets if math.sin(d - f) - math.sin(d) >= 0.0]
+    inside = [pair for pair in wrong if abs(pair[0]) <= 0.5 * math.pi]
+    slowest = min(abs(math.sin(d)) for _, d in wrong)
+    return holds_if(
+        "|ψ̄_a| ≤ 90°",
+        bool(wrong) and not inside,
+        f"no exception there; beyond, r > 0 may grow where the target leaves at {slowest * V_A:.1f} of 13 m/s or more",
+    )
+
+
 def starts_in_the_regions() -> Finding:
     """Where the paper's two starts lie: Remark 2's region, and Eq. (30)'s on the manifold."""
     lam = math.atan2(200.0 - 10.0, -200.0 - 10.0) - 0.5 * math.pi
@@ -217,7 +231,7 @@ def starts_in_the_regions() -> Finding:
     inside = abs(bars[30.0]) < 90.0 and abs(bars[130.0]) < 90.0
     beyond = bars[130.0] > reach["NFTSM as printed"]
     return holds_if(
-        "by Remark 2 (|ψ̄_a| < 90°) both starts are meant, not by Eq. (30)",
+        "that is Remark 2's region, |ψ̄_a| < 90°, not Eq. (30)'s",
         inside and beyond,
         f"ψ̄_a is {bars[30.0]:.1f}° from 30° and {bars[130.0]:.1f}° from 130°: inside Remark 2's region, the second by "
         f"{90.0 - bars[130.0]:.1f}°; Eq. (30) allows {reach['NFTSM as printed']:.1f}° with the printed gains "

@@ -63,7 +63,7 @@ def nftsm_is_faster(on: Column) -> Finding:
         for tolerance in sorted({1.0, on.tolerance}, reverse=True):
             a, b = (settled(on.paper(experiment, label), tolerance) for label in ("NFTSM", "SMC"))
             fine = fine and sooner(a, b)
-            told.append(f"from {experiment}° to {tolerance:g} m {within(a)} against {within(b)}")
+            told.append(f"from {experiment}° to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
     return holds(fine, "; ".join(told))
 
 
@@ -124,7 +124,7 @@ def faster_round_the_s(on: Column) -> Finding:
     for tolerance in sorted({1.0, on.tolerance}, reverse=True):
         a, b = (settled(on.paper("S", label, duration=330.0), tolerance) for label in ("NFTSM", "SMC"))
         fine = fine and sooner(a, b)
-        told.append(f"to {tolerance:g} m {within(a)} against {within(b)} of 330 s")
+        told.append(f"to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
     return holds(fine, "; ".join(told))
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from autopilot.guidance import Law
 from autopilot.laws import law
 from autopilot.nftsm import Nftsm
 from harness.flight import problems
@@ -52,8 +53,25 @@ def tracks_its_commands(on: Column) -> Finding:
     )
     return holds(
         rate < 0.25 and speed < 0.13 and height < 2.0,
-        f"heading rate {rate:.2g} deg/s rms off, airspeed {speed:.2g} m/s rms, altitude {height:.2g} m at the most "
+        f"heading rate {_told(rate)} deg/s rms off, airspeed {_told(speed)} m/s rms, altitude {_told(height)} "
+        "m at the most "
         "(allowed: 0.25, 0.13, 2)",
+    )
+
+
+def _told(x: float) -> str:
+    return f"{round(x, 6):.2g}"
+
+
+def coordinated(on: Column) -> Finding:
+    """NFTSM from 30 deg: does it turn as a coordinated aircraft does?"""
+    found = metrics(simulate(on.change(flight("30", "NFTSM", Reading(period=0.05)))))
+    ratio, sideslip = found["turn_ratio"], found["sideslip_peak_deg"]
+    if ratio is None or sideslip is None:
+        return holds(True, "it is the model itself: no bank, no sideslip")
+    return holds(
+        abs(ratio - 1.0) < 0.05 and sideslip < 2.0,
+        f"heading rate over g tan φ / V {ratio:.3f}, sideslip up to {sideslip:.2g}° (allowed: 5 % and 2°)",
     )
 
 
@@ -213,34 +231,45 @@ def reaches_zero(on: Column) -> Finding:
 
 def sampling(on: Column, label: str) -> Finding:
     """The longest guidance period at which the law converges from 30 deg, in whole steps: 5 ms to 0.5 s, then 0.5 s."""
+    limited = _converging(on, label, flight("30", label).law)
+    told = [f"from 30° to {tolerance:g} m {_longest(each)}" for tolerance, each in limited.items()]
+    free = law(*LAWS[label], max_heading_rate=math.inf)
+    if isinstance(free, Nftsm):
+        unlimited = _converging(on, label, free)
+        for i, (tolerance, each) in enumerate(unlimited.items()):
+            bound = longest_stable_period(free, manifold(free, math.atan(free.k1 * tolerance))[0])
+            told[i] += f", unlimited {_longest(each)} (the bound from k2 and k3: {_period(bound)})"
+    return holds(limited[1.0][0.5], "; ".join(told))
+
+
+def _converging(on: Column, label: str, steering: Law) -> dict[float, dict[float, bool]]:
+    """By tolerance (1 m, 1e-4 m) and guidance period: whether |r| is below in the last tenth of the flight."""
     duration, last = (600.0, 40) if label == "SMC" else (80.0, 4)
     periods = [n * _STEP for n in range(1, 101)] + [0.5 * n for n in range(2, last + 1)]
-    converged: dict[float, list[bool]] = {1.0: [], 1e-4: []}
-    for period in list(periods):
+    converged: dict[float, dict[float, bool]] = {1.0: {}, 1e-4: {}}
+    for period in periods:
         length = period * round(duration / period)
-        one = replace(flight("30", label), guidance_period=period, step=_STEP, duration=length)
-        if problems(on.change(one)):  # the column's measurements do not fit the period
-            periods.remove(period)
+        one = replace(flight("30", label), law=steering, guidance_period=period, step=_STEP, duration=length)
+        if problems(on.change(one)):  # the column's measurements do not fit this period
             continue
         log = on.fly(one)
-        late = np.abs(log["range_error"][log["time"] >= 0.9 * length])
+        late = float(np.abs(log["range_error"][log["time"] >= 0.9 * length]).max())
         for tolerance, each in converged.items():
-            each.append(bool(late.max() < tolerance))
-    told, steering = [], flight("30", label).law
-    for tolerance, each in converged.items():
-        gapless = each.index(False) if False in each else len(each)
-        text = (
-            f"to {tolerance:g} m up to {_period(periods[gapless - 1])}"
-            if gapless
-            else f"to {tolerance:g} m not at 5 ms"
-        )
-        if any(each[gapless:]):
-            text += f" and, with gaps, {_period(max(p for p, fine in zip(periods, each, strict=True) if fine))}"
-        if isinstance(steering, Nftsm):
-            bound = longest_stable_period(steering, manifold(steering, math.atan(steering.k1 * tolerance))[0])
-            text += f" (bound from k2 and k3: {1000.0 * bound:.0f} ms)"
-        told.append(text)
-    return holds(converged[1.0][periods.index(0.5)], f"from 30° it converges {'; '.join(told)}")
+            each[period] = late < tolerance
+    return converged
+
+
+def _longest(converged: dict[float, bool]) -> str:
+    """Up to which period it converges without a gap, and the longest at all."""
+    periods = list(converged)
+    gapless = list(converged.values()).index(False) if False in converged.values() else len(periods)
+    longest = max((period for period, fine in converged.items() if fine), default=0.0)
+    if not longest:
+        return f"not at {_period(periods[0])}"
+    if not gapless:
+        return f"at some up to {_period(longest)}"
+    through = periods[gapless - 1]
+    return f"up to {_period(through)}" + (f" (with gaps {_period(longest)})" if longest > through else "")
 
 
 def _period(seconds: float) -> str:

@@ -107,6 +107,13 @@ def dominance() -> Finding:
     )
 
 
+def without_the_fast_term() -> Finding:
+    """With alpha2 = 0 the manifold of Eq. (12) is that of Eq. (11)."""
+    g = replace(nftsm("NFTSM"), alpha2=0.0)
+    worst = max(abs(manifold(g, x)[0] - g.alpha3 * x**g.beta3) for x in (0.002, 0.1, 1.0, 1.5))
+    return holds(worst < EXACT, f"{below(worst)} off α3 sig^β3 outside η; the law flown as TSM, Eq. (34), is another")
+
+
 def remark_4() -> Finding:
     """The printed closed form, and the corrected one, against quadrature."""
     from scipy.integrate import quad

@@ -103,7 +103,7 @@ def over_time(
                 grid[i, j].plot(*drawn[quantity], color=COLOURS[name], lw=0.9, label=name)
             grid[i, j].set(ylabel=label, ylim=limits)
         grid[0, j].set(title=title)
-        grid[0, j].legend(loc="upper right")
+        grid[0, j].legend(loc="best")
         grid[-1, j].set(xlabel="t [s]")
 
 

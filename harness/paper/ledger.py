@@ -41,7 +41,9 @@ def holds_if(condition: str, true: bool, number: str) -> Finding:
 
 def metres(x: float) -> str:
     """A distance; what is rounding only is not told by its digits."""
-    return f"{x:.2g} m" if x >= 1e-6 else "below 1e-6 m"
+    if x < 1e-6:
+        return "below 1e-6 m"
+    return f"{x:.2g} m" if x < 99.5 else f"{x:.0f} m"
 
 
 def below(x: float) -> str:

@@ -49,7 +49,12 @@ def _figures(sketches: Sketches) -> dict[str, str]:
 
     stationary, s_shape, manoeuvring = {**case("30"), **case("130")}, case("S"), case("manoeuvres")
     errors, rates = {"r": _R, "s": _S}, {"rate": _RATE, "heading": _HEADING}
-    near = {"r": _R, "near": ("r", "r, near [m]", (-25.0, 25.0)), **rates}
+    near = {
+        "r": _R,
+        "near": ("r", "r, near [m]", (-25.0, 25.0)),
+        "rate": ("rate", "ω_ψ [deg/s]", (-25.0, 25.0)),  # NFTSM, not limited here, starts with -900
+        "heading": _HEADING,
+    }
     draw, over_time = figures.draw, figures.over_time
     return {
         "Figures 2 and 3. Terminal and fast terminal sliding modes.": draw(figures.terminal_modes),
@@ -69,7 +74,7 @@ def _figures(sketches: Sketches) -> dict[str, str]:
         "Figure 9a. The manoeuvring target.": draw(
             partial(figures.target_profile, drawn=sketches["manoeuvres", "SMC"]), height=2.6
         ),
-        "Figure 9b. Paths round the manoeuvring target.": draw(partial(figures.paths, cases=manoeuvring), height=5.0),
+        "Figure 9b. Paths round the manoeuvring target.": draw(partial(figures.paths, cases=manoeuvring), height=7.0),
         "Figure 10. Distance error (whole and near), heading rate, heading, round the manoeuvring target.": draw(
             partial(over_time, cases=manoeuvring, shown=near), height=7.5
         ),
