@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test install models identify lock bench clean
+.PHONY: demo test install models identify paper lock bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -27,6 +27,10 @@ models: install  ## write the JSBSim models from the airframes' data
 
 identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name || exit 1; done
+
+paper: install  ## the paper's numbers, figures and claims under docs/, anew
+	$(BIN)/harness reproduce --out docs
+	$(BIN)/python -m harness.paper.identified docs/identified.md
 
 bench: install  ## the speed of the loop, as ratios in one run, and of --help
 	$(BIN)/python -m benchmarks.flight_speed

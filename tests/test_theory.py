@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 
 from autopilot.laws import law
 from autopilot.nftsm import Nftsm, reaching
-from harness.flight import Flight
+from harness.flight import Flight, needed_rate
 from harness.flight_log import FlightLog
 from harness.paper.theory import (
     boundary_heading_error,
@@ -22,6 +22,8 @@ from harness.paper.theory import (
 )
 from harness.plant import Start
 from harness.simulation import simulate
+from harness.target import Target
+from harness.wind import Wind
 
 
 def gains(**override: float) -> Nftsm:
@@ -126,14 +128,34 @@ def test_the_three_conditions_of_definition_1_hold(heading: float) -> None:
     assert (r * r_dot)[reached & (np.abs(r) > 1e-5)].max() <= 0.0
 
 
-def test_the_start_at_130_degrees_is_within_remark_2_by_8_degrees_and_outside_eq_30() -> None:
-    """Remark 2 wants |bar psi_a| < 90 deg; on the manifold of the paper's set it stays below 47 deg, Eq. (30)."""
+def test_the_start_at_130_degrees_is_within_remark_2_by_8_degrees_and_outside_eq_30_with_the_printed_gains() -> None:
+    """Remark 2 wants |bar psi_a| < 90 deg; on the manifold Eq. (30) keeps it below 47 deg, identified 83 deg."""
     lam = math.atan2(200.0 - 10.0, -200.0 - 10.0) - math.pi / 2
     at_30, at_130 = (math.degrees(math.remainder(math.radians(psi) - lam, math.tau)) for psi in (30.0, 130.0))
     assert (at_30, at_130) == pytest.approx((-17.86, 82.14), abs=0.01)
-    paper = law("nftsm", "paper")
-    assert isinstance(paper, Nftsm)
-    assert math.degrees(manifold_reach(paper)) == pytest.approx(46.8, abs=0.1)
+    reach = {}
+    for name in ("paper", "identified"):
+        g = law("nftsm", name)
+        assert isinstance(g, Nftsm)
+        reach[name] = math.degrees(manifold_reach(g))
+    assert reach == pytest.approx({"paper": 46.8, "identified": 83.2}, abs=0.1)
+    assert reach["paper"] < at_130 < reach["identified"] < 90.0
+
+
+def test_holding_the_circle_takes_the_rate_of_the_feasibility_line() -> None:
+    """(v_a + w)^2 / (v_a R_d), where the aircraft has the target's motion against it."""
+    for speed, wind in ((0.0, (0.0, 0.0)), (5.0, (0.0, 0.0)), (2.0, (3.0, -2.0))):
+        one = Flight(
+            plant="kinematic",
+            law=gains(),
+            duration=260.0,
+            guidance_period=0.02,
+            target=Target(speed=speed, heading=0.7),
+            wind=Wind(steady=wind),
+        )
+        log = simulate(one)
+        taken = np.abs(log["heading_rate_command"][log["time"] > 60.0]).max()
+        assert taken == pytest.approx(needed_rate(one), rel=2e-3)
 
 
 def test_only_sets_within_eq_28_can_be_on_the_manifold_everywhere() -> None:

@@ -151,7 +151,7 @@ def all_converge_in_2000_s(on: Column) -> Finding:
     """The whole S, 2000 s."""
     told, fine = [], []
     for label in _LAWS:
-        log = on.paper("S", label)
+        log = on.paper("S", label, Reading(period=0.02))  # long, and not to be settled to 1e-4 m
         r, time = np.abs(log["range_error"]), log["time"]
         fine.append(float(r[time > 400.0].max()) < max(1.0, on.tolerance))
         told.append(f"{label} {metres(float(r[time > 400.0].max()))}")

@@ -29,12 +29,12 @@ Job = Callable[[], Part]
 
 def jobs() -> list[Job]:
     """What there is to compute, the longest first."""
-    sections = sorted(CLAIMS, key=lambda title: not title.startswith("4"))
+    sections = sorted(CLAIMS, key=lambda title: title.startswith("4"), reverse=True)
     return [
-        *(partial(_flown_claims, title, i) for title in reversed(sections) for i in reversed(range(len(COLUMNS)))),
         *(partial(_numbers, numbers) for numbers in reversed(by_flight())),
+        *(flown_claims(title, i) for title in sections for i in range(len(COLUMNS))),
         *(partial(_sketched, experiment, law) for experiment in EXPERIMENTS for law in LAWS_DRAWN),
-        _theory,
+        theory,
     ]
 
 
@@ -46,11 +46,17 @@ def _sketched(experiment: str, law: str) -> Part:
     return Part([], {(experiment, law): sketch(flown(flight(experiment, law)))}, {})
 
 
-def _flown_claims(title: str, column: int) -> Part:
+def flown_claims(title: str, column: int) -> Job:
+    """What flights decide of a section, in a column."""
+    return partial(_decided, title, column)
+
+
+def _decided(title: str, column: int) -> Part:
     return Part([], {}, decided(CLAIMS[title], COLUMNS[column]))
 
 
-def _theory() -> Part:
+def theory() -> Part:
+    """What formulas decide."""
     return Part([], {}, decided([claim for claims in CLAIMS.values() for claim in claims], None))
 
 
@@ -59,7 +65,7 @@ def everything(workers: int, done: Callable[[], None] = lambda: None) -> Part:
     numbers: list[Reproduced] = []
     sketches: dict[tuple[str, str], Sketch] = {}
     findings: dict[tuple[str, str], Finding] = {}
-    for part in _computed(jobs(), workers):
+    for part in computed(jobs(), workers):
         numbers += part.numbers
         sketches.update(part.sketches)
         findings.update(part.findings)
@@ -67,21 +73,20 @@ def everything(workers: int, done: Callable[[], None] = lambda: None) -> Part:
     return Part(in_order(numbers), sketches, findings)
 
 
-def _computed(todo: list[Job], workers: int) -> Iterator[Part]:
+def computed(todo: list[Job], workers: int) -> Iterator[Part]:
+    """The parts of these jobs, in any order."""
     if workers == 1:
         yield from (job() for job in todo)
         return
-    with multiprocessing.get_context("spawn").Pool(workers, _deaf) as pool:  # leaving it ends its processes
+    heard = signal.signal(signal.SIGINT, signal.SIG_IGN)  # what the workers inherit: their parent ends them
+    pool = multiprocessing.get_context("spawn").Pool(workers)
+    signal.signal(signal.SIGINT, heard)
+    with pool:
         yield from pool.imap_unordered(_done, todo)
 
 
 def _done(job: Job) -> Part:
     return job()
-
-
-def _deaf() -> None:
-    """A worker leaves Ctrl-C to its parent, which ends it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def workers() -> int:

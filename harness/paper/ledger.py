@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from enum import StrEnum
 from typing import NamedTuple
+from unicodedata import combining
 
 from harness.flight import Flight
 from harness.paper.experiments import EKF, Reading, Trace, flight, flown
@@ -161,10 +162,14 @@ def markdown(sections: Mapping[str, tuple[Claim, ...]], findings: Findings) -> s
     for title, claims in sections.items():
         lines += ["", f"## {title}", "", "| | the paper says | " + " | ".join(column.name for column in COLUMNS) + " |"]
         lines.append("|---|---|" + "---|" * len(COLUMNS))
-        for claim in claims:
-            told = [_cell(str(finding)) if finding else "" for finding in cells(claim, findings)]
-            lines.append(f"| {claim.key} | {_cell(claim.says)} | {' | '.join(told)} |")
+        lines += [row(claim, findings) for claim in claims]
     return "\n".join(lines) + "\n"
+
+
+def row(claim: Claim, findings: Findings) -> str:
+    """The claim's row in the document."""
+    found = [_cell(str(finding)) if finding else "" for finding in cells(claim, findings)]
+    return f"| {claim.key} | {_cell(claim.says)} | {' | '.join(found)} |"
 
 
 def told(sections: Mapping[str, tuple[Claim, ...]], findings: Findings) -> list[str]:
@@ -174,8 +179,12 @@ def told(sections: Mapping[str, tuple[Claim, ...]], findings: Findings) -> list[
     for claims in sections.values():
         for claim in claims:
             verdicts = "".join(f"{finding.verdict if finding else '':{width}}" for finding in cells(claim, findings))
-            lines.append(f"{claim.key:6}{claim.says:112}{verdicts}".rstrip())
+            lines.append(f"{claim.key:6}{_padded(claim.says, 112)}{verdicts}".rstrip())
     return lines
+
+
+def _padded(text: str, width: int) -> str:
+    return text + " " * (width - sum(not combining(letter) for letter in text))  # a dot above takes no room
 
 
 def _cell(text: str) -> str:
