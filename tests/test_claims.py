@@ -89,3 +89,15 @@ def test_an_interrupt_ends_it_with_130_and_leaves_no_file_and_no_process(tmp_pat
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(ProcessLookupError):
         os.killpg(running.pid, 0)
+
+
+def test_the_coefficients_document_says_what_the_flights_say() -> None:
+    """The fitted and unfitted numbers in full, one row of the map; that no other pair fits is left to `make paper`."""
+    from harness.paper.identified import BETA2, COARSE, FINE, map_row, point, unfitted_rows
+
+    committed = (DOCS / "identified.md").read_text(encoding="utf-8").splitlines()
+    for line in unfitted_rows():
+        assert line in committed
+    assert map_row(0.4, [point((0.4, beta2, COARSE)) for beta2 in BETA2]) in committed
+    assert point((0.4, 2.4, FINE)).prints
+    assert not point((0.5, 3.0, FINE)).prints
