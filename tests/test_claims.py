@@ -88,8 +88,18 @@ def test_an_interrupt_ends_it_with_130_and_leaves_no_file_and_no_process(tmp_pat
     assert running.returncode == 130
     assert said.decode().strip() == "interrupted"
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(ProcessLookupError):
-        os.killpg(running.pid, 0)
+    assert _gone(running.pid)
+
+
+def _gone(group: int) -> bool:
+    """Whether no process of the group is left, given the moment that a machine takes to clear a dead one away."""
+    for _ in range(50):
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.1)
+    return False
 
 
 def test_the_coefficients_document_says_what_the_flights_say() -> None:
