@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test install models identify paper lock bench clean
+.PHONY: demo test install models identify paper lock turbulence bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -31,6 +31,13 @@ identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 paper: install  ## the paper's numbers, figures and claims under docs/, anew
 	$(BIN)/harness reproduce --out docs
 	$(BIN)/python -m harness.paper.identified docs/identified.md
+
+turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (a quarter of an hour)
+	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/moderate --log none
+	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/unturned --log none --set wind.rotation=false --limit 60
+	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90
+	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
+	$(BIN)/python -m harness.weather out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
 
 bench: install  ## the speed of the loop, as ratios in one run, and of --help
 	$(BIN)/python -m benchmarks.flight_speed
