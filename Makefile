@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test install models identify lock bench clean
+.PHONY: demo test install models identify verdict lock bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -27,6 +27,11 @@ models: install  ## write the JSBSim models from the airframes' data
 
 identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name || exit 1; done
+
+verdict: install  ## fly the full matrix (about 20 minutes on two free processors), compare, and write docs/results.md
+	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none
+	$(BIN)/harness report out/assumption
+	$(BIN)/harness report out/assumption --markdown docs/results.md
 
 bench: install  ## the speed of the loop, as ratios in one run, and of --help
 	$(BIN)/python -m benchmarks.flight_speed
