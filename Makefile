@@ -32,6 +32,7 @@ bench: install  ## the speed of the loop, as ratios in one run, of --help, of re
 	$(BIN)/python -m benchmarks.flight_speed
 	$(BIN)/python -m benchmarks.help_speed
 	$(BIN)/python -m benchmarks.recording_speed
+	$(BIN)/python -m benchmarks.runs
 
 lock:  ## resolve the dependencies anew (needs uv)
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \
