@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test install models identify paper lock turbulence bench clean verdict
+.PHONY: demo test install models identify paper lock turbulence verdict bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -39,7 +39,6 @@ turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (a q
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
 	$(BIN)/python -m harness.weather out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
 
-bench: install  ## the speed of the loop, as ratios in one run, and of --help
 verdict: install  ## fly the full matrix (about 20 minutes on two free processors), compare, and write docs/results.md
 	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none
 	$(BIN)/harness report out/assumption
@@ -49,6 +48,7 @@ bench: install  ## the speed of the loop, as ratios in one run, of --help, of re
 	$(BIN)/python -m benchmarks.flight_speed
 	$(BIN)/python -m benchmarks.help_speed
 	$(BIN)/python -m benchmarks.recording_speed
+	$(BIN)/python -m benchmarks.runs
 
 lock:  ## resolve the dependencies anew (needs uv)
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \

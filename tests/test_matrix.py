@@ -1,5 +1,6 @@
 """A matrix of flights as a file describes it."""
 
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -178,6 +179,15 @@ def test_the_survey_counts_and_tells_idle_seeds(matrix) -> None:
 def test_a_file_without_a_matrix_is_one_flight(matrix) -> None:
     (combination,) = matrix("").combinations()
     assert matrix("").flight(combination).duration == 1.0
+
+
+def test_the_documents_matrix_is_right(matrix) -> None:
+    text = (Path(__file__).parent.parent / "docs" / "experiments.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    m = matrix(example)
+    *_, found = survey(m, limit=40)
+    assert found.flights == 40
+    assert len(m) == 2 * 20 * 6 * 5 * 2 - 6 * 5 * 2 + 20
 
 
 def test_every_shipped_experiment_is_right() -> None:

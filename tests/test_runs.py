@@ -1,10 +1,15 @@
 """Runs as a user meets them: real workers, a real store, killed and resumed."""
 
+import itertools
 import json
 import math
+import os
+import platform
 import shutil
+import sqlite3
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
@@ -15,7 +20,7 @@ from harness.metrics import MEANING
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, mixed_versions
 from harness.runs.run import Options, Progress, run
-from harness.runs.store import JOURNAL
+from harness.runs.store import JOURNAL, reading
 from harness.settings import read_settings
 
 MATRIX = """\
@@ -143,8 +148,161 @@ def test_the_number_of_workers_and_the_order_change_nothing(file: Path, tmp_path
         assert digests(tmp_path / f"{workers}") == alone
 
 
-def test_a_changed_setting_law_track_or_airframe_is_a_new_flight_and_a_mix_is_told(tmp_path: Path, file: Path) -> None:
-    out = tmp_path / "out"
-    flown(file, out, "plant=kinematic")
-    assert flown(file, out, "plant=kinematic", "duration_s=3.0").done == 5
+def append(path: Path, text: str) -> None:
+    path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
+
+
+@pytest.fixture
+def own_copy(tmp_path: Path) -> Path:
+    """A folder with copies of the packages, in which files may be edited: a Python started there uses them."""
+    root = Path(harness.__file__).parent.parent
+    for package in ("harness", "autopilot", "aircraft"):
+        shutil.copytree(root / package, tmp_path / "copy" / package, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "copy"
+
+
+def in_copy(copy: Path, *words: object) -> str:
+    """The command, of the copy; its last line."""
+    done = subprocess.run(
+        [sys.executable, "-m", "harness", *map(str, words)],
+        cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1] if words[0] == "run" else done.stderr.splitlines()[-1]
+
+
+def test_an_edited_law_inner_loop_airframe_or_track_is_a_new_flight_and_a_mix_is_told(
+    own_copy: Path, tmp_path: Path
+) -> None:
+    track = own_copy / "track.csv"
+    track.write_text("time_s,north_m,east_m\n" + "".join(f"{t},{t},0\n" for t in range(5)))
+    file, out = own_copy / "m.toml", tmp_path / "out"
+    file.write_text(
+        '[flight]\nduration_s = 1.0\n[flight.law]\nname = "smc"\n[flight.target]\ntrack = "track.csv"\n'
+        '[matrix]\nplant = ["kinematic", "sixdof"]\n'
+    )
+    run_it = ("run", file, "--out", out, "--workers", 0, "--log", "none")
+    assert in_copy(own_copy, *run_it).startswith("2 flown, 0 earlier")
+    edits = [  # a file, what is added to it, how many of the flights are new
+        (own_copy / "autopilot" / "smc.py", "\n# another law\n", 2),
+        (own_copy / "autopilot" / "inner_loop.xml", "<!-- another loop -->\n", 1),
+        (own_copy / "aircraft" / "ultra_stick_25e" / "ultra_stick_25e.xml", "<!-- another airframe -->\n", 1),
+        (track, "5,9,0\n", 2),
+    ]
     assert mixed_versions(out) == []
+    for path, text, new in edits:
+        append(path, text)
+        assert in_copy(own_copy, *run_it).startswith(f"{new} flown, {2 - new} earlier"), path
+        assert in_copy(own_copy, *run_it).startswith("0 flown, 2 earlier"), path
+    told = mixed_versions(out)
+    assert [line.split(" has ")[0] for line in told] == [
+        "autopilot/smc.py",
+        f"the track {track}",
+        "autopilot/inner_loop.xml",
+        "aircraft/model of ultra_stick_25e",
+    ]
+    assert told[0].endswith("has 2 versions, of 2 and 6 flights")
+
+
+def test_a_row_of_another_version_is_flown_with_a_warning_that_has_the_largest_deviation(
+    own_copy: Path, tmp_path: Path
+) -> None:
+    file, out = own_copy / "m.toml", tmp_path / "out"
+    file.write_text('[flight]\nplant = "kinematic"\nduration_s = 10.0\n[flight.law]\nname = "smc"\n')
+    in_copy(own_copy, "run", file, "--out", out, "--workers", 0)
+    (key,) = harness.load_results(out)["key"]
+    law = own_copy / "autopilot" / "smc.py"
+    again = ("fly", f"{out}:{key[:5]}", "--json")
+    assert in_copy(own_copy, *again).endswith("to the last bit")
+    append(law, "\n# another text of the same law\n")
+    assert in_copy(own_copy, *again).endswith("to the last bit")
+    law.write_text(law.read_text().replace("c1 * atan(", "1.001 * c1 * atan("))
+    told = in_copy(own_copy, *again)
+    assert told.startswith("warning: not the flight that is stored (changed since: autopilot/smc.py): ")
+    assert "at the end is" in told
+
+
+def test_the_store_knows_where_its_rows_come_from(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command("run", file, "--out", out, "--workers", 1, "--limit", 1, "--log", "none")
+    with reading(out) as journal:
+        journal.row_factory = sqlite3.Row
+        (run_,) = journal.execute("SELECT * FROM runs").fetchall()
+    assert run_["settings"] == MATRIX
+    assert "run" in run_["command"]
+    assert str(file) in run_["command"]
+    assert run_["started"] <= run_["ended"]
+    assert json.loads(run_["packages"])["jsbsim"] == version("jsbsim")
+    assert run_["python"] == platform.python_version()
+    root = Path(harness.__file__).parent.parent
+    head = subprocess.run(["git", "-C", str(root), "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+    assert run_["git_commit"] == (head.stdout.strip() or None)
+
+
+@pytest.mark.parametrize(("log", "expected"), [("all", 30), ("none", 0), ("failed", 3), ("sample", 10)])
+def test_the_flights_asked_for_are_recorded(tmp_path: Path, monkeypatch, log: str, expected: int) -> None:
+    file, out = tmp_path / "m.toml", tmp_path / "out"
+    file.write_text(
+        '[flight]\nduration_s = 1.0\nplant = "kinematic"\n[flight.law]\nname = "smc"\n'
+        '[matrix]\n"metrics.monitoring_range_m" = [1.0, 5000.0]\nseed = { start = 0, count = 15 }\n'
+        '[[exclude]]\n"metrics.monitoring_range_m" = 1.0\nseed = 0\n'
+        "[[include]]\nseed = 99\n"
+        if log != "failed"
+        else '[flight]\nduration_s = 1.0\nplant = "kinematic"\n[flight.law]\nname = "smc"\n'
+        '[matrix]\n"metrics.monitoring_range_m, seed" = [[1.0, 0], [1.0, 1], [1.0, 2], [5000.0, 3], [5000.0, 4]]\n'
+    )
+    monkeypatch.setattr("harness.runs.run.RECORDED", 10)
+    flown(file, out, log=log)
+    results = harness.load_results(out)
+    recorded = {path.stem for path in (out / "flights").iterdir()} if expected else set()
+    assert recorded <= set(results["key"])
+    assert len(recorded) == expected
+    if log == "failed":
+        assert set(results["key"][results["outcome"] == "target_lost"]) == recorded
+
+
+def test_a_sample_has_whole_pairs(file: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("harness.runs.run.RECORDED", 4)
+    flown(file, tmp_path / "out", log="sample")
+    results = harness.load_results(tmp_path / "out").set_index("key")
+    recorded = [path.stem for path in (tmp_path / "out" / "flights").iterdir()]
+    assert sorted(results.loc[recorded, "plant"]) == ["kinematic", "kinematic", "sixdof", "sixdof"]
+    assert results.loc[recorded, "seed"].nunique() == 2
+
+
+def test_a_dry_run_tells_the_size_and_writes_nothing(file: Path, tmp_path: Path) -> None:
+    done = command("run", file, "--dry-run", "--set", "law.max_heading_rate_deg_s=3.0")
+    assert done.returncode == 0
+    lines = done.stdout.splitlines()
+    assert lines[2:6] == [
+        "10 flights",
+        "  seed: 5 values",
+        "  plant: 2 values",
+        "  start.heading_deg: drawn from the seed",
+    ]
+    assert lines[6].startswith("10 circles are INFEASIBLE")
+    assert lines[7].startswith("about 1 s with ")
+    assert list(tmp_path.iterdir()) == [file]
+    assert "change nothing" in command("run", file, "--dry-run", "--set", "start.heading_deg=3.0").stderr
+    checked = command("check", file)
+    assert checked.returncode == 0
+    assert checked.stdout.splitlines()[-1] == f"{file}: ok"
+
+
+EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("*.toml"))
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=[path.stem for path in EXPERIMENTS])
+def test_a_shipped_experiment_flies(experiment: Path, tmp_path: Path) -> None:
+    """The first flights of each, much shorter: by every plant that it names."""
+    progress = flown(experiment, tmp_path / "out", "duration_s=2.0", limit=4)
+    assert (progress.failed, progress.done) == (0, min(4, progress.total))
+    matrix = read_matrix(read_settings(experiment))
+    assert matrix.experiment.question.endswith("?")
+    results = harness.load_results(tmp_path / "out")
+    assert set(results["plant"]) == {matrix.flight(c).plant for c in itertools.islice(matrix.combinations(), 4)}
+
+
+def test_the_experiments_of_the_issue_are_shipped() -> None:
+    names = {"paper", "wind", "bank", "sampling", "gains", "aircraft", "monte_carlo"}
+    assert names <= {path.stem for path in EXPERIMENTS}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 PARQUET = "flights.parquet"
 _LISTS_OF_TABLES = ("segments", "gusts")
-_AT_ONCE = 5000  # rows
+_AT_ONCE = 1000  # rows
 _FIRST = ("key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds")
 _STAND = b"journal_changes"  # in the Parquet file's metadata: how far the journal was
 

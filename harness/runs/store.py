@@ -31,6 +31,8 @@ CREATE TABLE flights (
     outcome TEXT NOT NULL, reason TEXT NOT NULL, digest TEXT NOT NULL, settings TEXT NOT NULL, metrics TEXT NOT NULL,
     feasibility_margin_deg_s REAL, seconds REAL, final TEXT NOT NULL
 );
+CREATE INDEX flights_by_version ON flights (version);
+CREATE INDEX flights_done ON flights (key, version, outcome);
 CREATE TABLE positions (
     matrix TEXT NOT NULL, position INTEGER NOT NULL, key TEXT NOT NULL, PRIMARY KEY (matrix, position)
 ) WITHOUT ROWID;
@@ -193,8 +195,11 @@ def begun(journal: sqlite3.Connection) -> bool:
 
 def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
     """Each version in the store, with the settings of one flight of it."""
-    rows = journal.execute("SELECT version, settings, min(rowid) FROM flights GROUP BY version")
-    return [(version, json.loads(settings)) for version, settings, _ in rows]
+    rows = journal.execute(
+        "SELECT v.id, (SELECT settings FROM flights f WHERE f.version = v.id LIMIT 1) AS example FROM versions v "
+        "WHERE example IS NOT NULL"
+    )
+    return [(version, json.loads(settings)) for version, settings in rows]
 
 
 def positions(journal: sqlite3.Connection, matrix: str, versions: Sequence[str], *, failed: bool) -> set[int]:
