@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test install models identify paper lock turbulence bench clean
+.PHONY: demo test install models identify paper verdict lock turbulence bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -38,6 +38,11 @@ turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (a q
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
 	$(BIN)/python -m harness.weather out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
+
+verdict: install  ## fly the full matrix (about 20 minutes on two free processors), compare, and write docs/results.md
+	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none
+	$(BIN)/harness report out/assumption
+	$(BIN)/harness report out/assumption --markdown docs/results.md
 
 bench: install  ## the speed of the loop, as ratios in one run, and of --help
 	$(BIN)/python -m benchmarks.flight_speed
