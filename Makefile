@@ -44,9 +44,10 @@ verdict: install  ## fly the full matrix (about 20 minutes on two free processor
 	$(BIN)/harness report out/assumption
 	$(BIN)/harness report out/assumption --markdown docs/results.md
 
-bench: install  ## the speed of the loop, as ratios in one run, and of --help
+bench: install  ## the speed of the loop, as ratios in one run, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed
 	$(BIN)/python -m benchmarks.help_speed
+	$(BIN)/python -m benchmarks.recording_speed
 
 lock:  ## resolve the dependencies anew (needs uv)
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \

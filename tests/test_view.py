@@ -1,5 +1,6 @@
 """`harness view` and `harness export`: flights of a run chosen, flown again where need be, compared with the store."""
 
+import socket
 import sqlite3
 from pathlib import Path
 
@@ -141,3 +142,12 @@ def test_without_a_display_the_way_out_is_named(tmp_path: Path, monkeypatch: pyt
     done = command("view", tmp_path / "a.rrd")
     assert done.exit_code == 2
     assert done.stderr == "there is no display here: write a file with --save, and open it where there is one\n"
+
+
+def test_an_empty_viewer_on_a_port_that_is_taken_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = command("view", "--port", port)
+    assert done.exit_code == 2
+    assert f"port {port} is taken" in done.stderr

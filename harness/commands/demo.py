@@ -44,4 +44,4 @@ def demo(out: Path) -> None:
         for sentence in job.differences(those):
             click.echo(textwrap.fill(sentence, 110, initial_indent="- ", subsequent_indent="  "))
         click.echo()
-    click.echo(f"{len(written)} recordings in {out}. To open one: .venv/bin/rerun {written[0]}")
+    click.echo(f"{len(written)} recordings in {out}. To open one: .venv/bin/harness view {written[0]}")

@@ -15,6 +15,7 @@ _HEIGHT = 870.0  # points: height of all tabs in a window 1000 high
 _LANE, _LANES = 38.0, 52.0  # points: height of a lane, and of what is around all of them
 _EVENTS = 190.0  # points: height of the events
 _LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of all else there
+_ENTRY, _AROUND_LEGEND = 23.5, 70.0  # points: height of a line of a legend, and of all else in its row
 _AXIS = 35.0  # points: width of the numbers beside a plot
 _MOST_WITH_CHASE = 3  # flights
 PlayState = Literal["following", "paused"]
@@ -75,10 +76,8 @@ def _overview(content: Content) -> Tab:
         rows += [_strip(plots[name], content, gutter, legend=False) for name in ("heading_rate",) if name in plots]
         rows += _beside([plots[name] for name in ("bank", "sideslip") if name in plots], content)
         below = _beside(content.differences, content)
-    weights = [max(1.0, 0.31 * _entries(plot)) for plot in legends]
-    weights += [1.0] * (len(rows) + len(below) - len(weights))
     room = _HEIGHT - (0.0 if many else lanes_height)
-    shares = [room * weight / sum(weights) for weight in weights]
+    shares = _heights([_AROUND_LEGEND + _ENTRY * _entries(plot) for plot in legends], len(rows) + len(below), room)
     if not many:
         shares.insert(len(rows), lanes_height)
         rows.append(lanes)
@@ -160,6 +159,13 @@ def _whole(content: Content, gutter: float) -> rrb.TimeAxis:
     """The whole flight, and beside it a share of the width for the legend."""
     begin, last = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (0.0, content.until / (1.0 - gutter)))
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(begin, last))
+
+
+def _heights(legends: Sequence[float], rows: int, room: float) -> list[float]:
+    """Heights of the rows: what its legend takes for each that needs more than its share, the rest alike."""
+    tall = [height if height > room / rows else 0.0 for height in [*legends, *[0.0] * (rows - len(legends))]]
+    even = (room - sum(tall)) / max(1, tall.count(0.0))
+    return [height or even for height in tall]
 
 
 def _entries(plot: Plot) -> int:

@@ -46,9 +46,16 @@ def address(port: int) -> str:
 
 
 def show(path: Path | None, port: int = PORT) -> None:
-    """Opens a window with the recording, or an empty one, and waits until it is closed. Raises `ViewerError`."""
+    """Opens a window with the recording, or an empty one, and waits until it is closed. Raises `ViewerError`.
+
+    Where another viewer has the port, the recording's window takes a free one: it would be sent to the other.
+    """
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise ViewerError("there is no display here: write a file with --save, and open it where there is one")
+    if listening(port):
+        if path is None:
+            raise ViewerError(f"port {port} is taken: by a viewer that is open already, or give another --port")
+        port = free_port()
     window = _started([*_at(port), *([str(path)] if path else [])], None)
     try:
         code = window.wait()
