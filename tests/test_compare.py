@@ -240,8 +240,8 @@ def test_a_browser_shows_all_of_the_page(page: Path, tmp_path: Path) -> None:
     done = opened(page, tmp_path)
     dom = done.stdout
     shown = re.findall(r'<section[^>]* id="(\w+)"', dom)
-    assert shown == ["answer", "scorecard", "differences", "distributions", "attribution", "flights", "margins"]
-    assert dom.count("<svg") == 2  # distributions, and one waterfall of one airframe and law
+    assert shown == ["answer", "scorecard", "differences", "distributions", "attribution", "map", "flights", "margins"]
+    assert dom.count("<svg") == 3  # distributions, one waterfall of one airframe and law, the map
     assert dom.count("harness view") >= 3
     for sentence in ("Does it hold?", "What breaks first?", "What does it cost?"):
         assert sentence in dom

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -16,6 +17,7 @@ from harness.verdict.pairs import axes, spread
 from harness.verdict.scorecard import Finding, Scorecard, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
 
+_MAP = Path(__file__).parents[2] / "docs" / "images" / "limit_cycle.svg"  # of `harness.verdict.limit_cycle`
 MOST_FLIGHTS = 60  # pairs listed on a page
 MOST_DRAWN = 12  # airframes and laws whose attribution is drawn: the page stays below 3 MB
 
@@ -105,6 +107,7 @@ def _rendered(template: str, comparison: Comparison, origin: Origin, *, autoesca
             (a, _attributed(a) if html else []) for a in comparison.attributions[: MOST_DRAWN if html else None]
         ],
         undrawn=max(0, len(comparison.attributions) - MOST_DRAWN),
+        map=_map() if html else None,
         listed=list(listed(comparison, origin.folder)) if html else [],
         confidence=f"{100 * CONFIDENCE:.0f} %",
         resamples=RESAMPLES,
@@ -153,6 +156,18 @@ def _attributed(attribution: Attribution) -> list[Figure]:
             )
         )
     return found
+
+
+def _map() -> Figure | None:
+    """The map of the gains, which is the airframes' and not of these flights; only a checkout has it."""
+    if not _MAP.is_file():
+        return None
+    svg = _MAP.read_text(encoding="utf-8")
+    return Figure(
+        svg[svg.index("<svg") :],
+        "Reaching gains k2 and k3 of NFTSM against the bandwidth of the inner loop: the predicted border of the limit "
+        "cycle and flown points, from docs/limit_cycle.md. It is of the airframes, not of the flights of this run.",
+    )
 
 
 def shading(card: Scorecard, finding: Finding) -> Iterator[Shading]:
