@@ -305,7 +305,7 @@ def _check(journal: sqlite3.Connection, folder: Path, *, whole: bool) -> None:
     if version != _FORMAT:
         raise StoreError(f"{path}: has format {version}, this harness reads format {_FORMAT}: use another directory")
     if whole and (damage := journal.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
-        raise StoreError(f"{path}: is damaged ({damage}): nothing was changed; move it away")
+        raise StoreError(f"{path}: is damaged ({' '.join(damage.split())}): nothing was changed; move it away")
 
 
 def _locked(path: Path) -> int:
