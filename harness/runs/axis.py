@@ -64,7 +64,8 @@ class Draw:
         drawn = (
             a + (b - a) * noise.random(a.shape) if self.kind == "uniform" else a + b * noise.standard_normal(a.shape)
         )
-        return drawn.tolist()  # type: ignore[no-any-return]
+        value: float | list[float] = drawn.tolist()
+        return value
 
 
 def flattened(table: Mapping[str, object]) -> Iterator[tuple[tuple[str, ...], str, object]]:
