@@ -2,8 +2,6 @@
 
 from functools import partial
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from harness.paper import figures
 from harness.paper.claims import CLAIMS
 from harness.paper.experiments import EXPERIMENTS
@@ -11,6 +9,7 @@ from harness.paper.figures import LAWS_DRAWN, Sketch
 from harness.paper.job import Part, Sketches
 from harness.paper.ledger import COLUMNS, Verdict, cells, counts
 from harness.paper.reproduce import VARIANTS, VARIANTS_TOLD, shown
+from harness.template import template
 
 _R, _S = ("r", "r [m]", None), ("s", "s [rad]", None)
 _RATE, _HEADING = ("rate", "ω_ψ [deg/s]", None), ("heading", "ψ_a [deg]", None)
@@ -18,14 +17,7 @@ _RATE, _HEADING = ("rate", "ω_ψ [deg/s]", None), ("heading", "ψ_a [deg]", Non
 
 def page(everything: Part) -> str:
     """The HTML page."""
-    environment = Environment(
-        loader=PackageLoader("harness.paper", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html.jinja").render(
+    return template("harness.paper", "page.html.jinja").render(
         results=everything.numbers,
         agreeing=sum(result.agrees for result in everything.numbers),
         variants=list(VARIANTS),

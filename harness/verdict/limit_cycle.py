@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -25,6 +24,7 @@ from harness.plants.lagged import Lagged
 from harness.plants.sixdof import SixDof
 from harness.simulation import command, observe
 from harness.target import Target
+from harness.template import template
 from harness.verdict.prediction import VISIBLE, LimitCycle, Loop, boundary, critical_gain, limit_cycle
 
 AIRFRAMES = ("ultra_stick_25e", "skywalker_x8", "aerosonde")
@@ -270,17 +270,18 @@ def _largest_k2(loop: Loop, q: float) -> float:
 def _plane(loop: Loop, q: float) -> list[tuple[float, float]]:
     """The border in the plane of k2 and k3, from k3 = 0 on."""
     angles = np.linspace(0.0, 0.5 * math.pi, 9)
-    sizes = [
-        boundary(lambda k, a=a: with_gains(_quicker(loop, q), k * math.cos(a), k * math.sin(a)), 3.0 * q)  # type: ignore[misc]
-        for a in angles.tolist()
-    ]
-    return [(k * math.cos(a), k * math.sin(a)) for k, a in zip(sizes, angles.tolist(), strict=True)]
+    return [_corner(loop, q, math.cos(angle), math.sin(angle)) for angle in angles.tolist()]
+
+
+def _corner(loop: Loop, q: float, a: float, b: float) -> tuple[float, float]:
+    """The largest k2 and k3, as a to b, without a limit cycle behind an inner loop q times as quick."""
+    k = boundary(lambda k: with_gains(_quicker(loop, q), k * a, k * b), 3.0 * q)
+    return k * a, k * b
 
 
 def document(found: Sequence[Row], borders: Sequence[Border]) -> str:
     """docs/limit_cycle.md."""
-    environment = Environment(loader=PackageLoader("harness.verdict", "."), undefined=StrictUndefined, trim_blocks=True)
-    return environment.get_template("limit_cycle.md.jinja").render(
+    return template("harness.verdict", "limit_cycle.md.jinja").render(
         rows=found, missed=[row for row in found if not within(row)], borders=borders, off=off, degrees=math.degrees,
         frequency_within=100 * FREQUENCY_WITHIN, amplitude_within=100 * AMPLITUDE_WITHIN,
     ) + "\n"  # fmt: skip

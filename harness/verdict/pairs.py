@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -169,8 +170,8 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float | np.number) and not isinstance(value, bool | np.bool_)
 
 
-def _rank(value: object) -> float:
-    return float(SEVERITY.index(value)) if isinstance(value, str) else float(value)  # type: ignore[arg-type]
+def _rank(value: Any) -> float:
+    return float(SEVERITY.index(value) if isinstance(value, str) else value)
 
 
 def _alike(flights: pd.DataFrame, differing: Sequence[str]) -> pd.Series:

@@ -3,9 +3,9 @@
 On its circle the aircraft turns at omega_0 = -v_a / R_d. The command u, held for a period T, makes the heading error e
 and the range error r, and the law makes the command of them:
 
-    e(z) = H(z) (u(z) - omega_0),   r(z) = v_a I(z) (u(z) - omega_0),   u = law(e, r)
+    e(z) = H(z) (u(z) - omega_0),   r(z) = v_a J(z) (u(z) - omega_0),   u = law(e, r)
 
-where H and I are the identified response's first and second integral at the sampling instants. A steady oscillation
+where H and J are the identified response's first and second integral at the sampling instants. A steady oscillation
 e = sum of E_m exp(i m omega t) has E_m = H(exp(i m omega T)) U_m for every harmonic m of u, and U_0 = omega_0: the turn
 biases the law, and a mean range error makes up for it. With one harmonic this is the biased describing function; with
 more it tends to the cycle of the sampled loop itself. The law is called as in flight: no gain of it is approximated.
@@ -88,10 +88,10 @@ def _cycle(loop: Loop, x: Array) -> _Cycle:
     m = np.arange(1, higher + 2)
     omega = float(np.exp(x[0]))
     E = np.exp(x[1]) * np.append(1.0, x[3 : 3 + higher] + 1j * x[3 + higher :])
-    H, I = loop.response.sampled(loop.period, np.exp(1j * m * omega * loop.period)).T  # noqa: E741 - as above
+    H, J = loop.response.sampled(loop.period, np.exp(1j * m * omega * loop.period)).T
     wave = np.exp(2j * math.pi * np.outer(np.arange(_SAMPLES), m) / _SAMPLES)
     e = 2.0 * np.real(wave @ E)
-    r = loop.airspeed * (float(x[2]) + 2.0 * np.real(wave @ (E * I / H)))
+    r = loop.airspeed * (float(x[2]) + 2.0 * np.real(wave @ (E * J / H)))
     u = loop.commands(e, r)
     U = np.fft.fft(u)[: higher + 2] / _SAMPLES
     off = (H * U[1:] - E) / abs(E[0])

@@ -6,10 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from harness.metrics import MEANING
 from harness.settings.written import written
+from harness.template import template
 from harness.verdict import figures, words
 from harness.verdict.attribution import METRICS, Attribution
 from harness.verdict.comparison import Comparison, Row, axes_of
@@ -73,24 +72,17 @@ class Table:
 
 def page(comparison: Comparison, origin: Origin) -> str:
     """The HTML page."""
-    return _rendered("report.html.jinja", comparison, origin, autoescape=True)
+    return _rendered("report.html.jinja", comparison, origin)
 
 
 def markdown(comparison: Comparison, origin: Origin) -> str:
     """The same without figures and flights, for `docs/results.md`."""
-    return _rendered("results.md.jinja", comparison, origin, autoescape=False)
+    return _rendered("results.md.jinja", comparison, origin)
 
 
-def _rendered(template: str, comparison: Comparison, origin: Origin, *, autoescape: bool) -> str:
-    environment = Environment(
-        loader=PackageLoader("harness.verdict", "."),
-        autoescape=autoescape,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    html = template.endswith("html.jinja")
-    return environment.get_template(template).render(
+def _rendered(name: str, comparison: Comparison, origin: Origin) -> str:
+    html = name.endswith("html.jinja")
+    return template("harness.verdict", name).render(
         comparison=comparison,
         origin=origin,
         answer=words.answer(comparison),
