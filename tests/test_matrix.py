@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from harness.runs.matrix import Matrix, read_matrix
@@ -85,6 +86,24 @@ def test_a_drawn_value_is_the_seeds_own_whatever_the_plant_law_or_place(matrix) 
     assert sum(headings) / 400 == pytest.approx(15.0, abs=3 * 10 / 12**0.5 / 20)
 
 
+def test_a_value_of_a_list_may_be_drawn_too(matrix) -> None:
+    towards = "{ speed_mps = 2.0, towards_deg = { uniform = [0.0, 360.0] } }"
+    m = matrix(
+        f'[matrix]\nseed = {{ start = 0, count = 300 }}\n"wind.steady_mps, wind.turbulence" = '
+        f'[[[0.0, 0.0], "none"], [{towards}, "none"], [{towards}, "light"]]\n'
+    )
+    winds = np.array(values(m, "wind.steady_mps")).reshape(300, 3, 2)  # seed, element, component
+    assert m.draws == ["wind.steady_mps"]
+    assert not winds[:, 0].any()
+    assert (winds[:, 1] == winds[:, 2]).all()  # the seed's own, whatever the place
+    assert np.hypot(*winds[:, 1].T) == pytest.approx(2.0)
+    assert np.abs(winds[:, 1].mean(axis=0)).max() < 3 * 2.0 / 2**0.5 / 300**0.5
+    alone = matrix(f'[matrix]\nseed = [7]\n"wind.steady_mps" = {towards}\n')
+    assert values(alone, "wind.steady_mps") == [winds[7, 1].tolist()]
+    speeds = matrix(f'[matrix]\nseed = [7]\n"wind.steady_mps" = {towards.replace("2.0", "[0, 2, 4]")}\n')
+    assert values(speeds, "wind.steady_mps") == [[0, 0], winds[7, 1].tolist(), (2 * winds[7, 1]).tolist()]
+
+
 def test_keys_with_a_comma_vary_together(matrix) -> None:
     m = matrix('[matrix]\n"aircraft, start.airspeed_mps" = [["ultra_stick_25e", 13.0], ["aerosonde", 25.0]]\n')
     flights = [m.flight(c) for c in m.combinations()]
@@ -127,6 +146,11 @@ MISTAKES = [
     ("[matrix]\nseed = []\n", "m.toml:8: matrix.seed: the list is empty"),
     ("[matrix]\nduration_s = { from = 1, to = 2, step = -1 }\n", "m.toml:8: matrix.duration_s: step is -1"),
     ('[matrix]\n"start.heading_deg" = { uniform = [1] }\n', "m.toml:8: matrix.start.heading_deg: uniform is [1]"),
+    ('[matrix]\n"start.heading_deg" = [{ start = 0, count = 3 }]\n', "has the keys count, start in a list, must be"),
+    (
+        '[matrix]\n"wind.steady_mps" = { speed_mps = 2, towards_deg = { uniform = [[0], [1]] } }\n',
+        "m.toml:8: matrix.wind.steady_mps: towards_deg is {'uniform': [[0], [1]]}, must be numbers, { uniform",
+    ),
     ('[matrix]\n"seed, plant" = [[1, "sixdof"], [2]]\n', "element 2 is [2], must be a list of 2: seed, plant"),
     (
         '[matrix]\nseed = [1]\n"seed, plant" = [[1, "sixdof"]]\n',

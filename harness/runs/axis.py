@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 FORMS = (
     "a list, { start, count }, { from, to, step }, { speed_mps, towards_deg }, { uniform = [a, b] } or "
     "{ normal = [mean, deviation] }"
+)
+DRAWN_FORMS = (
+    "{ uniform = [a, b] }, { normal = [mean, deviation] } or { speed_mps = v, towards_deg = { uniform = [a, b] } }"
 )
 _MOST = 10_000_000  # values of an axis
 
@@ -19,7 +22,7 @@ class Axis:
     """The values of one key, or of several that vary together."""
 
     keys: tuple[str, ...]
-    values: Sequence[Any]  # of several keys, each a list with one for each key
+    values: Sequence[Any]  # of several keys, each a list with one for each key; what is drawn is a `Draw`
     lines: Sequence[int]  # where each stands; one for all that stand together
 
     def __len__(self) -> int:
@@ -33,6 +36,11 @@ class Axis:
     def line(self, i: int) -> int:
         """Where the i-th value stands."""
         return self.lines[min(i, len(self.lines) - 1)]
+
+    @property
+    def draws(self) -> list[str]:
+        """The keys with a value that is drawn."""
+        return [key for key, values in self.choices().items() if any(isinstance(v, Draw) for v in values)]
 
     def choices(self) -> dict[str, Sequence[Any]]:
         """All values of each key."""
@@ -52,11 +60,10 @@ class Axis:
 class Draw:
     """A value drawn for each seed: uniform between a and b, or normal with mean a and deviation b; of vectors, each."""
 
-    key: str
     kind: str
     a: Any
     b: Any
-    line: int
+    length: float | None = None  # if given, what is drawn is the direction, deg, of a vector of this length
 
     def value(self, noise: np.random.Generator) -> float | list[float]:
         """The value that this stream of random numbers gives."""
@@ -64,8 +71,14 @@ class Draw:
         drawn = (
             a + (b - a) * noise.random(a.shape) if self.kind == "uniform" else a + b * noise.standard_normal(a.shape)
         )
+        if self.length is not None:
+            return _towards(self.length, float(drawn))
         value: float | list[float] = drawn.tolist()
         return value
+
+    def __str__(self) -> str:
+        drawn = f"{{ {self.kind} = [{self.a}, {self.b}] }}"
+        return drawn if self.length is None else f"{{ speed_mps = {self.length:g}, towards_deg = {drawn} }}"
 
 
 def flattened(table: Mapping[str, object]) -> Iterator[tuple[tuple[str, ...], str, object]]:
@@ -91,35 +104,47 @@ _MARKS = set().union(*_FORMS) - {"speed_mps"}  # which is a key of [flight.targe
 
 def _is_form(table: Mapping[str, object]) -> bool:
     """Whether a table describes values, if perhaps mistyped, and is no table of further keys."""
-    return not _MARKS.isdisjoint(table) and not any(isinstance(value, Mapping) for value in table.values())
+    tables = {name for name, value in table.items() if isinstance(value, Mapping)}
+    return not _MARKS.isdisjoint(table) and tables <= {"towards_deg"}
 
 
-def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -> Axis | Draw:
-    """The axis of an entry. A list is its values, or, without `lists`, one value. ValueError says what is wrong."""
+def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -> Axis:
+    """The axis of an entry. A list is its values, or, without `lists`, one value. ValueError says what is wrong.
+
+    A form of `DRAWN_FORMS` may stand for any value.
+    """
     keys = tuple(name.split(", "))
     if not all(word for key in keys for word in key.split(".")):
         raise ValueError("the key must be a dotted name below [flight], as in law.gains, or several with commas")
     if isinstance(value, Mapping):
         if len(keys) > 1:
             raise ValueError("keys that vary together need a list of lists, one value for each key")
-        return _form(keys[0], value, line(0))
-    if not isinstance(value, list):
-        if lists:
-            raise ValueError(f"is {value!r}, must be {FORMS}")
-        value = [value]
-    elif not lists:
-        value = [value]
-    if not value:
+        return Axis(keys, _form(value), [line(0)])
+    if lists and not isinstance(value, list):
+        raise ValueError(f"is {value!r}, must be {FORMS}")
+    values: list[Any] = value if lists and isinstance(value, list) else [value]
+    if not values:
         raise ValueError("the list is empty: no flight is left")
+    lines = [line(i) for i in range(len(values))]
     if len(keys) == 1:
-        return Axis(keys, value, [line(i) for i in range(len(value))])
-    for i, element in enumerate(value):
-        if not (isinstance(element, list) and len(element) == len(keys)):
-            raise ValueError(f"element {i + 1} is {element!r}, must be a list of {len(keys)}: {name}")
-    return Axis(keys, value, [line(i) for i in range(len(value))])
+        return Axis(keys, [_element(one) for one in values], lines)
+    for i, one in enumerate(values):
+        if not (isinstance(one, list) and len(one) == len(keys)):
+            raise ValueError(f"element {i + 1} is {one!r}, must be a list of {len(keys)}: {name}")
+    return Axis(keys, [[_element(of_key) for of_key in one] for one in values], lines)
 
 
-def _form(key: str, table: Mapping[str, Any], line: int) -> Axis | Draw:
+def _element(value: object) -> object:
+    """A value of a list: itself, or what a form draws."""
+    if not isinstance(value, Mapping) or not _is_form(value):
+        return value
+    form = _form(value) if set(value) in _FORMS else ()
+    if len(form) != 1 or not isinstance(form[0], Draw):
+        raise ValueError(f"has the keys {', '.join(sorted(value))} in a list, must be a value, {DRAWN_FORMS}")
+    return form[0]
+
+
+def _form(table: Mapping[str, Any]) -> Sequence[Any]:
     """The values that a table describes."""
     if set(table) not in _FORMS:
         raise ValueError(f"has the keys {', '.join(sorted(table))}, must be {FORMS}")
@@ -127,20 +152,34 @@ def _form(key: str, table: Mapping[str, Any], line: int) -> Axis | Draw:
         start, count = (_whole(table, name) for name in ("start", "count"))
         if not 1 <= count <= _MOST:
             raise ValueError(f"count is {count}, must be from 1 to {_MOST}")
-        return Axis((key,), range(start, start + count), [line])
+        return range(start, start + count)
     if "from" in table:
-        return Axis((key,), _range(table), [line])
+        return _range(table)
     if "towards_deg" in table:
-        speeds, ways = (_numbers(table, name) for name in ("speed_mps", "towards_deg"))
-        winds = [
-            [round(speed * f(math.radians(way)), 12) + 0.0 for f in (math.cos, math.sin)]
-            for speed in speeds
-            for way in (ways if speed else ways[:1])  # still air has no direction
-        ]
-        return Axis((key,), winds, [line])
+        return _vectors(table)
+    return [_draw(table)]
+
+
+def _draw(table: Mapping[str, Any]) -> Draw:
     kind = "uniform" if "uniform" in table else "normal"
-    a, b = _two(table, kind)
-    return Draw(key, kind, a, b, line)
+    return Draw(kind, *_two(table, kind))
+
+
+def _vectors(table: Mapping[str, Any]) -> Sequence[Any]:
+    """Of each speed towards each direction, or towards one that is drawn. Still air has no direction."""
+    speeds, ways = _numbers(table, "speed_mps"), table["towards_deg"]
+    if not isinstance(ways, Mapping):
+        ways = _numbers(table, "towards_deg")
+        return [_towards(speed, way) for speed in speeds for way in (ways if speed else ways[:1])]
+    if set(ways) not in ({"uniform"}, {"normal"}) or isinstance((drawn := _draw(ways)).a, list):
+        forms = "{ uniform = [a, b] } or { normal = [mean, deviation] }"
+        raise ValueError(f"towards_deg is {dict(ways)!r}, must be numbers, {forms}")
+    return [replace(drawn, length=speed) if speed else _towards(0.0, 0.0) for speed in speeds]
+
+
+def _towards(length: float, way_deg: float) -> list[float]:
+    """North and east of a vector."""
+    return [round(length * f(math.radians(way_deg)), 12) + 0.0 for f in (math.cos, math.sin)]
 
 
 def _range(table: Mapping[str, Any]) -> Sequence[float]:
@@ -168,9 +207,10 @@ def _number(table: Mapping[str, Any], name: str) -> float:
 
 def _numbers(table: Mapping[str, Any], name: str) -> list[float]:
     value = table[name]
-    if not isinstance(value, list) or not value:
-        raise ValueError(f"{name} is {value!r}, must be a list of numbers")
-    return [_finite(v, name) for v in value]
+    values = value if isinstance(value, list) else [value]
+    if not values:
+        raise ValueError(f"{name} is {value!r}, must be a number, or a list of numbers")
+    return [_finite(v, name) for v in values]
 
 
 def _two(table: Mapping[str, Any], kind: str) -> tuple[Any, Any]:

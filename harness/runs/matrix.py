@@ -25,10 +25,9 @@ class Combination(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A product of axes, the last one fastest; and what is drawn for each of its seeds."""
+    """A product of axes, the last one fastest."""
 
     axes: Sequence[Axis]
-    draws: Sequence[Draw]
 
     def __len__(self) -> int:
         return math.prod(map(len, self.axes))
@@ -51,7 +50,7 @@ class Matrix:
     @property
     def draws(self) -> list[str]:
         """The keys whose values are drawn from the seed."""
-        return list(dict.fromkeys(draw.key for block in self.blocks for draw in block.draws))
+        return list(dict.fromkeys(key for block in self.blocks for a in block.axes for key in a.draws))
 
     @property
     def identifier(self) -> str:
@@ -85,11 +84,10 @@ class Matrix:
             lines.update(dict.fromkeys(a.keys, a.line(i)))
         if number == 0 and any(all(values.get(k) == v for k, v in table.items()) for table in self.excluded):
             return None
-        if block.draws:
-            seed = _seed(values.get("seed", _table(self.file.document, "flight").get("seed", 0)))
-            for draw in block.draws:
-                values[draw.key] = draw.value(stream(seed, f"matrix:{draw.key}"))
-                lines[draw.key] = draw.line
+        seed = _seed(values.get("seed", _table(self.file.document, "flight").get("seed", 0)))
+        for key, value in values.items():
+            if isinstance(value, Draw):
+                values[key] = value.value(stream(seed, f"matrix:{key}"))
         return Combination(position, values, lines)
 
     @property
@@ -162,7 +160,6 @@ def _block(
     file: SettingsFile, at: Key, table: Mapping[str, object], *, lists: bool, fixed: Sequence[Key], mistakes: list[str]
 ) -> Block:
     axes: list[Axis] = []
-    draws: list[Draw] = []
     seen: set[str] = set()
     for key, name, value in flattened(table):
         where = (*at, *key)
@@ -171,19 +168,15 @@ def _block(
         except ValueError as error:
             mistakes.append(f"{file.path}:{_line(file, where)}: {'.'.join(map(str, at))}.{name}: {error}")
             continue
-        keys = made.keys if isinstance(made, Axis) else (made.key,)
-        if twice := seen.intersection(keys):
+        if twice := seen.intersection(made.keys):
             mistakes.append(
                 f"{file.path}:{_line(file, where)}: {at[0]}.{name}: {', '.join(sorted(twice))} is an axis already"
             )
-        seen.update(keys)
-        free = [k for k in keys if not _is_fixed(k, fixed)]
-        if isinstance(made, Draw):
-            draws += [made] if free else []
-        elif free:
+        seen.update(made.keys)
+        if free := [key for key in made.keys if not _is_fixed(key, fixed)]:
             axes.append(made.only(free))
     axes.sort(key=lambda a: a.keys == ("plant",))  # the plant fastest: pairs are complete early
-    return Block(axes, draws)
+    return Block(axes)
 
 
 def _exclusion(
