@@ -175,17 +175,18 @@ def test_still_air_and_a_fixed_start_give_one_difference_and_no_interval(tmp_pat
 
 
 def test_the_full_matrix_goes_all_the_way_when_reduced(tmp_path: Path) -> None:
-    """`make verdict` on the first airframe, law and limit of one seed: every plant, every disturbance."""
+    """`make verdict` on the first airframe, law and circle of one seed: every plant, every disturbance."""
     file = Path(__file__).parent.parent / "experiments" / "assumption.toml"
-    out = run(tmp_path, file.read_text(encoding="utf-8"), "--limit", 28, "--set", "duration_s=20.0")
+    words = ("--limit", 32, "--set", "duration_s=20.0", "--set", "law.max_heading_rate_deg_s=10.0")
+    out = run(tmp_path, file.read_text(encoding="utf-8"), *words)
     answer = compared(out)
-    assert len(answer["pairs"]) == 21
+    assert len(answer["pairs"]) == 24
     assert [card["plant"] for card in answer["scorecards"]] == ["sixdof", "coordinated", "lagged"]
     (attributed,) = answer["attributions"]
     assert attributed["rungs"] == ["kinematic", "lagged", "coordinated", "sixdof"]
     added = [step["what"] for step in attributed["disturbances"] if step["plant"] == "sixdof"]
     assert list(dict.fromkeys(added)) == [
-        "wind 2 m/s", "turbulence moderate", "sampling 0.2 s", "estimator ekf", "airspeed used measured",
+        "wind 2 m/s", "turbulence light", "turbulence moderate", "sampling 0.2 s", "estimator ekf", "airspeed used measured",
     ]  # fmt: skip
     assert harness("report", out, "--markdown", tmp_path / "results.md").exit_code == 0
 
