@@ -27,20 +27,18 @@ class Version(NamedTuple):
 class Identity(NamedTuple):
     """What makes a flight this one."""
 
+    key: str  # a hash of both
     settings: Mapping[str, Any]  # a [flight] table in file units
     version: Version
-
-    @property
-    def key(self) -> str:
-        settings = self.settings
-        if settings["target"]["track"] is not None:  # its content counts, not where it lies
-            settings = {**settings, "target": {**settings["target"], "track": "content"}}
-        return hashed({"settings": settings, "version": self.version.number})
 
 
 def identity(flight: Flight) -> Identity:
     """What makes the flight this one. OSError when a file that it reads is gone."""
-    return Identity(document(flight), version_of(flight))
+    settings, version = document(flight), version_of(flight)
+    hashed_ones = settings
+    if settings["target"]["track"] is not None:  # its content counts, not where it lies
+        hashed_ones = {**settings, "target": {**settings["target"], "track": "content"}}
+    return Identity(hashed({"settings": hashed_ones, "version": version.number}), settings, version)
 
 
 def version_of(flight: Flight) -> Version:
@@ -51,7 +49,7 @@ def version_of(flight: Flight) -> Version:
         "filterpy": ("filterpy",) if flight.estimator.kind == "ekf" else (),
     }
     paths = _paths(flight.plant, flight.aircraft, flight.target.track)
-    changed = tuple((name, path, Path(path).stat().st_mtime_ns) for name, path in paths)
+    changed = tuple((name, path, path.stat().st_mtime_ns) for name, path in paths)
     return _version(PHYSICS, METRICS, changed, tuple(libraries.items()))
 
 
@@ -62,11 +60,11 @@ def flight_key(flight: Flight) -> str:
 
 def files(flight: Flight) -> dict[str, Path]:
     """Every file whose content decides the flight, by a name that says what it is for."""
-    return {name: Path(path) for name, path in _paths(flight.plant, flight.aircraft, flight.target.track)}
+    return dict(_paths(flight.plant, flight.aircraft, flight.target.track))
 
 
 @lru_cache(maxsize=256)
-def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, str], ...]:
+def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, Path], ...]:
     on_board = Path(autopilot.__file__).parent
     found = {f"autopilot/{path.name}": path for path in sorted(on_board.glob("*.py"))}
     if track is not None:
@@ -81,21 +79,21 @@ def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, str], .
         if plant in IDENTIFIED_PLANTS:
             names.append(aircraft.identified(airframe).name)
         found |= {f"aircraft/{name}": airframe / name for name in names}
-    return tuple((name, str(path)) for name, path in found.items())
+    return tuple(found.items())
 
 
 @lru_cache(maxsize=256)
 def _version(
     physics: int,
     metrics: int,
-    files: tuple[tuple[str, str, int], ...],
+    files: tuple[tuple[str, Path, int], ...],
     libraries: tuple[tuple[str, tuple[str, ...]], ...],
 ) -> Version:
     """Of files by name, path and time of change, and of the libraries for each purpose."""
     decides = {
         "physics": physics,
         "metrics": metrics,
-        "content": {name: content_hash(Path(path).read_bytes()) for name, path, _ in files},
+        "content": {name: content_hash(path.read_bytes()) for name, path, _ in files},
         **{purpose: {name: version(name) for name in names} or None for purpose, names in libraries},
     }
     return Version(hashed(decides), decides)

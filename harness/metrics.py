@@ -118,8 +118,8 @@ def _mixes(command: Array, y: Array, longest: int) -> tuple[Array, Array]:
     square = np.maximum(_sums(c * c, begin, size) - total * total / size, 1e-20 * (c @ c))  # less is rounding
     uu, ll = square[:-1], square[1:]
     ul = _sums(c[1:] * c[:-1], begin[1:], size) - total[:-1] * total[1:] / size
-    uy = np.array([c[k : k + size] @ y for k in begin])
-    uy, ly = uy[:-1], uy[1:]
+    products = np.correlate(c, y, "valid")[begin]
+    uy, ly = products[:-1], products[1:]
     det = uu * ll - ul * ul
     both = det > 1e-12 * uu * ll
     a, b = ((v / np.where(both, det, 1.0)) for v in (uy * ll - ly * ul, ly * uu - uy * ul))
@@ -136,7 +136,10 @@ def _sums(x: Array, begin: NDArray[np.intp], size: int) -> Array:
 
 
 def _turn_ratio(log: FlightLog) -> float | None:
-    coordinated = GRAVITY * np.tan(log["bank"]) / log["airspeed"]
+    bank = log["bank"]
+    if np.isnan(bank).all():  # the plant has none
+        return None
+    coordinated = GRAVITY * np.tan(bank) / log["airspeed"]
     if (_rms(coordinated) or 0.0) < LEAST_EXCITATION:
         return None
     return float(coordinated @ log["heading_rate"] / (coordinated @ coordinated))

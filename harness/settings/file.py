@@ -152,7 +152,7 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
         track = str(folder.absolute() / flight.target.track)
         flight = replace(flight, target=replace(flight.target, track=track))
     beside = str(folder.absolute() / flight.aircraft)
-    if flight.aircraft not in ("", *aircraft.names()) and os.path.isdir(beside):  # noqa: PTH112 - knows no error
+    if flight.aircraft and os.path.isdir(beside) and flight.aircraft not in aircraft.names():  # noqa: PTH112 - knows no error
         flight = replace(flight, aircraft=beside)
     found = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
     if found:
