@@ -18,6 +18,7 @@ from harness.commands.reproduce import reproduce
 from harness.commands.run import run
 from harness.commands.show import show
 from harness.commands.view import view
+from harness.stdout import guard
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -52,12 +53,23 @@ for command in (
 
 def main() -> None:
     """The entry point."""
+    guard()
     try:
         code = harness.main(standalone_mode=False)
     except click.ClickException as error:
-        error.show()
+        _tell(error)
         code = error.exit_code
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)
         code = 130
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _tell(error: click.ClickException) -> None:
+    """On one line, also what Click tells on several; a command without a word is told how it is used."""
+    if isinstance(error, click.UsageError) and not isinstance(error, click.exceptions.NoArgsIsHelpError):
+        command = error.ctx.command_path if error.ctx else "harness"
+        message = " ".join(error.format_message().split()).rstrip(".")
+        click.echo(f"{command}: {message}; try '{command} --help'", err=True)
+    else:
+        error.show()

@@ -1,14 +1,19 @@
 """The self-tests of an installation: versions, wind and units on the JSBSim that is really there."""
 
+import math
 import platform
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 import aircraft
 from harness.air import Air
 from harness.plant import Start
-from harness.plants.sixdof import compare_units, wind_triangle_error
+from harness.plants.sixdof import SixDof, load, si, trim
 
 PACKAGES = ("standoff-harness", "jsbsim", "numpy", "filterpy", "pandas", "pydantic", "rerun-sdk")
 WIND_TOLERANCE = 1e-6  # m/s
@@ -39,3 +44,57 @@ def examine() -> Iterator[Finding]:
         units = compare_units(airframe)
         what, error = max(((u.what, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
         yield Finding(f"units, {name}", f"{len(units)} quantities, worst {error:.1e} ({what})", error < UNIT_TOLERANCE)
+
+
+def wind_triangle_error(airframe: Path, start: Start, air: Air) -> float:
+    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air from the body's axes."""
+    flying = SixDof(airframe, 0.005, True).start(start, air)
+    flying.advance(0.0, 2.0)
+    fdm, state = flying.fdm, flying.state
+    phi, theta, psi = (fdm[f"attitude/{angle}-rad"] for angle in ("phi", "theta", "psi"))
+    through_air = _body_to_ned(phi, theta, psi) @ [si(fdm, f"velocities/{axis}-aero-fps") for axis in "uvw"]
+    over_ground = np.array((state.velocity_north, state.velocity_east, state.velocity_down))
+    wind = (state.wind_north, state.wind_east, state.wind_down)
+    return float(np.abs(over_ground - through_air - wind).max())
+
+
+def _body_to_ned(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
+    """The direction cosine matrix C_nb of the Euler angles (Stevens & Lewis, Eq. 1.3-20, transposed)."""
+    s_f, c_f, s_t, c_t, s_p, c_p = (f(x) for x in (phi, theta, psi) for f in (math.sin, math.cos))
+    return np.array(
+        [
+            [c_t * c_p, s_f * s_t * c_p - c_f * s_p, c_f * s_t * c_p + s_f * s_p],
+            [c_t * s_p, s_f * s_t * s_p + c_f * c_p, c_f * s_t * s_p - s_f * c_p],
+            [-s_t, s_f * c_t, c_f * c_t],
+        ]
+    )
+
+
+class UnitCheck(NamedTuple):
+    """One quantity in SI: as the airframe's data have it, and as JSBSim keeps it in other units."""
+
+    what: str
+    data: float
+    jsbsim: float
+
+
+def compare_units(airframe: Path) -> list[UnitCheck]:
+    """Mass, inertia, geometry, airspeed and altitude of a trimmed airframe, each by both."""
+    data = aircraft.data(airframe)
+    mass, ref = data["mass"], data["ref"]
+    fdm = load(airframe, 0.005)
+    start = Start(airspeed=aircraft.limits(airframe).design_airspeed)
+    trim(fdm, start, Air())
+    return [
+        UnitCheck(*row)
+        for row in (
+            ("mass kg", mass["m"]["v"], si(fdm, "inertia/mass-slugs")),
+            ("Ixx kg m2", mass["Ixx"]["v"], si(fdm, "inertia/ixx-slugs_ft2")),
+            ("Ixz kg m2", mass["Ixz"]["v"], -si(fdm, "inertia/ixz-slugs_ft2")),
+            ("wing area m2", ref["S"]["v"], si(fdm, "metrics/Sw-sqft")),
+            ("span m", ref["b"]["v"], si(fdm, "metrics/bw-ft")),
+            ("chord m", ref["c"]["v"], si(fdm, "metrics/cbarw-ft")),
+            ("airspeed m/s", start.airspeed, si(fdm, "velocities/vt-fps")),
+            ("altitude m", start.altitude, si(fdm, "position/h-sl-ft")),
+        )
+    ]

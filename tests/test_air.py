@@ -9,10 +9,11 @@ import pytest
 import aircraft
 from autopilot.laws import law
 from harness.air import Air
+from harness.doctor import wind_triangle_error
 from harness.flight import Flight, air_of, problems
 from harness.plant import Start
 from harness.plants.kinematic import Kinematic
-from harness.plants.sixdof import SixDof, wind_triangle_error
+from harness.plants.sixdof import SixDof
 from harness.simulation import observe, simulate
 from harness.target import TargetState
 from harness.wind import Gust, Wind

@@ -1,8 +1,10 @@
 """The command line as a user meets it: real processes, real files, exit codes."""
 
 import json
+import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -212,9 +214,45 @@ def test_every_command_shows_an_example(command: str) -> None:
     assert "Example" in harness(command, "--help").stdout
 
 
-def test_a_mistyped_command_or_kind_is_exit_code_2() -> None:
-    assert harness("fyl").returncode == 2
-    assert harness("list", "planes").returncode == 2
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("fyl", "harness: No such command 'fyl'. Did you mean 'fly'?; try"),
+        ("list planes", "harness list: Invalid value for '{laws|aircraft|plants|metrics|margins}': 'planes' is not"),
+        ("run", "harness run: Missing argument 'FILE'; try"),
+        ("run x.toml --wokers 2", "harness run: No such option '--wokers'"),
+        ("run x.toml --out x --workers two", "harness run: Invalid value for '--workers': 'two' is not"),
+        ("run x.toml", "--out DIR is missing"),
+        ("run x.toml --out x", "x.toml: No such file or directory"),
+    ],
+)
+def test_a_mistyped_command_line_is_one_line_and_exit_code_2(words: str, told: str) -> None:
+    done = harness(*words.split())
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert told in line  # after the name by which the command was called
+    assert not done.stdout
+
+
+def test_output_that_nobody_reads_ends_the_command_quietly(file: Path) -> None:
+    for words in (("list", "metrics"), ("fly", file, "--set", "law.name=smc", "--set", "law.gains=paper"), ("--help",)):
+        reader, writer = os.pipe()
+        os.close(reader)
+        done = subprocess.run(
+            [sys.executable, "-m", "harness", *map(str, words)], stdout=writer, stderr=subprocess.PIPE, check=False
+        )
+        os.close(writer)
+        assert done.returncode == 128 + signal.SIGPIPE
+        assert not done.stderr
+
+
+def test_output_for_which_there_is_no_room_is_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "harness", "list", "metrics"], stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr.decode() == "standard output: No space left on device\n"
 
 
 def test_the_doctor_finds_this_installation_sound() -> None:

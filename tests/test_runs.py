@@ -202,6 +202,10 @@ def test_an_edited_law_inner_loop_airframe_or_track_is_a_new_flight_and_a_mix_is
         "aircraft/model of ultra_stick_25e",
     ]
     assert told[0].endswith("has 2 versions, of 2 and 6 flights")
+    refused = command("compare", out)
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert "of different versions, which a comparison must not mix: autopilot/smc.py has 2 versions, of 2 and" in line
 
 
 def test_a_row_of_another_version_is_flown_with_a_warning_that_has_the_largest_deviation(

@@ -16,9 +16,10 @@ import aircraft
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.laws import law
 from harness.air import Air
+from harness.doctor import wind_triangle_error
 from harness.flight import Flight
 from harness.plant import End, Outcome, PlantError, Start
-from harness.plants.sixdof import ModelError, SixDof, load, wind_triangle_error, write
+from harness.plants.sixdof import ModelError, SixDof, load, write
 from harness.simulation import simulate
 from harness.target import Segment, Target
 from harness.wind import Wind

@@ -14,9 +14,10 @@ from scipy.signal import welch
 import aircraft
 from autopilot.laws import law
 from harness.air import Air, Array
+from harness.doctor import wind_triangle_error
 from harness.flight import Flight, air_of, problems
 from harness.plant import End, Outcome, Start
-from harness.plants.sixdof import SixDof, engage, load, trim, wind_triangle_error, write
+from harness.plants.sixdof import SixDof, engage, load, trim, write
 from harness.randomness import stream
 from harness.simulation import simulate
 from harness.turbulence import FOOT, W20, Dryden, _gradient, dryden, lag_chain, turbulence

@@ -25,7 +25,8 @@ def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: st
     """
     import json
 
-    from harness.commands.comparing import busy, read_comparison
+    from harness.commands.comparing import read_comparison
+    from harness.commands.telling import busy
     from harness.verdict.words import lines
     from harness.verdict.written import as_csv, as_document, as_latex
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,14 +36,6 @@ def read_comparison(folder: Path, baseline: str, overrides: tuple[str, ...]) -> 
     except (StoreError, CompareError) as error:
         text = str(error)
         raise BadInput(text if text.startswith(str(folder)) else f"{folder}: {text}") from None
-
-
-def busy(what: str) -> AbstractContextManager[object]:
-    """Says on a terminal what takes its time."""
-    from rich.console import Console
-
-    terminal = Console(stderr=True)
-    return terminal.status(what) if terminal.is_terminal else nullcontext()
 
 
 def _assess(folder: Path, settings: str, file: str, overrides: list[str]) -> Assess:

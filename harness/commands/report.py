@@ -19,8 +19,8 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
       harness report out/wind
       harness report out/assumption --markdown docs/results.md
     """
-    from harness.commands.comparing import busy, read_comparison
-    from harness.commands.telling import BadInput, writable
+    from harness.commands.comparing import read_comparison
+    from harness.commands.telling import BadInput, busy, writable
     from harness.verdict import report as job
 
     if out is not None and markdown is not None:

@@ -48,7 +48,7 @@ def run(
     import os
 
     from harness.commands.run_telling import surveyed, tell_results, tell_survey, tell_time
-    from harness.commands.telling import BadInput
+    from harness.commands.telling import BadInput, busy
     from harness.runs.matrix import read_matrix
     from harness.runs.results import export
     from harness.runs.run import Options, positions_done
@@ -72,7 +72,8 @@ def run(
         options = Options(workers=workers, limit=limit, log=log, retry_failed=retry is not None, timeout=flight_timeout)
         tell_survey(matrix, found, len(done))
         progress = _flown(matrix, out, options)
-        export(out)
+        with busy("writing the table of flights"):
+            export(out)
         tell_results(matrix, out, progress)
     except (SettingsError, StoreError, WorkersError) as error:
         raise BadInput(str(error)) from None

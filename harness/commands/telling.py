@@ -7,6 +7,7 @@ import os
 import shlex
 import sys
 import tempfile
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -78,6 +79,14 @@ def number(value: float | None) -> str:
     return f"{value:.3g}" if abs(value) >= 0.0005 else "0"
 
 
+def busy(what: str) -> AbstractContextManager[object]:
+    """Says on a terminal what takes its time."""
+    from rich.console import Console
+
+    terminal = Console(stderr=True)
+    return terminal.status(what) if terminal.is_terminal else nullcontext()
+
+
 def writable(path: Path) -> Path:
     """The path, if a file can be made there."""
     folder = path.parent
@@ -99,6 +108,8 @@ def writable(path: Path) -> Path:
 def writable_folder(path: Path) -> Path:
     """The folder, made if need be, if files can be made in it."""
     try:
+        if path.exists() and not path.is_dir():
+            raise BadInput(f"{path}: is a file, not a folder")
         path.mkdir(parents=True, exist_ok=True)
         _probe(path)
     except OSError as error:

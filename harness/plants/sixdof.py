@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 
 import jsbsim
 import numpy as np
-from numpy.typing import NDArray
 
 import aircraft
 import autopilot
@@ -22,6 +21,7 @@ from harness.state import State
 
 FT = 0.3048  # m
 SLUG = 4.4482216152605 / FT  # kg
+_SI = {"ft": FT, "fps": FT, "sqft": FT**2, "slugs": SLUG, "slugs_ft2": SLUG * FT**2}
 GRAVITY = 9.80665  # m/s^2
 RADIUS = 6371000.0  # m, as in planet.xml
 GROUND = 15.0  # m: below this height the flight has ended
@@ -99,6 +99,11 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
 def write(fdm: jsbsim.FGFDMExec, name: str, value: float) -> None:
     """Sets a property that exists: JSBSim creates one for every mistyped name."""
     _node(fdm, name).set_double_value(value)
+
+
+def si(fdm: jsbsim.FGFDMExec, name: str) -> float:
+    """A property in SI, by the unit in which its name ends."""
+    return fdm[name] * _SI.get(name.rpartition("-")[2], 1.0)
 
 
 def _node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
@@ -374,57 +379,3 @@ class _SixDofFlying:
                 phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, gust_x, gust_y, FT * gust_z,
             )
         )  # fmt: skip
-
-
-def wind_triangle_error(airframe: Path, start: Start, air: Air) -> float:
-    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air from the body's axes."""
-    flying = SixDof(airframe, 0.005, True).start(start, air)
-    flying.advance(0.0, 2.0)
-    fdm, state = flying.fdm, flying.state
-    phi, theta, psi = (fdm[f"attitude/{angle}-rad"] for angle in ("phi", "theta", "psi"))
-    through_air = _body_to_ned(phi, theta, psi) @ [FT * fdm[f"velocities/{axis}-aero-fps"] for axis in "uvw"]
-    over_ground = np.array((state.velocity_north, state.velocity_east, state.velocity_down))
-    wind = (state.wind_north, state.wind_east, state.wind_down)
-    return float(np.abs(over_ground - through_air - wind).max())
-
-
-def _body_to_ned(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
-    """The direction cosine matrix C_nb of the Euler angles (Stevens & Lewis, Eq. 1.3-20, transposed)."""
-    s_f, c_f, s_t, c_t, s_p, c_p = (f(x) for x in (phi, theta, psi) for f in (math.sin, math.cos))
-    return np.array(
-        [
-            [c_t * c_p, s_f * s_t * c_p - c_f * s_p, c_f * s_t * c_p + s_f * s_p],
-            [c_t * s_p, s_f * s_t * s_p + c_f * c_p, c_f * s_t * s_p - s_f * c_p],
-            [-s_t, s_f * c_t, c_f * c_t],
-        ]
-    )
-
-
-class UnitCheck(NamedTuple):
-    """One quantity in SI: as the airframe's data have it, and as JSBSim keeps it in other units."""
-
-    what: str
-    data: float
-    jsbsim: float
-
-
-def compare_units(airframe: Path) -> list[UnitCheck]:
-    """Mass, inertia, geometry, airspeed and altitude of a trimmed airframe, each by both."""
-    data = aircraft.data(airframe)
-    mass, ref = data["mass"], data["ref"]
-    fdm = load(airframe, 0.005)
-    start = Start(airspeed=aircraft.limits(airframe).design_airspeed)
-    trim(fdm, start, Air())
-    return [
-        UnitCheck(*row)
-        for row in (
-            ("mass kg", mass["m"]["v"], SLUG * fdm["inertia/mass-slugs"]),
-            ("Ixx kg m2", mass["Ixx"]["v"], SLUG * FT**2 * fdm["inertia/ixx-slugs_ft2"]),
-            ("Ixz kg m2", mass["Ixz"]["v"], -SLUG * FT**2 * fdm["inertia/ixz-slugs_ft2"]),
-            ("wing area m2", ref["S"]["v"], FT**2 * fdm["metrics/Sw-sqft"]),
-            ("span m", ref["b"]["v"], FT * fdm["metrics/bw-ft"]),
-            ("chord m", ref["c"]["v"], FT * fdm["metrics/cbarw-ft"]),
-            ("airspeed m/s", start.airspeed, FT * fdm["velocities/vt-fps"]),
-            ("altitude m", start.altitude, FT * fdm["position/h-sl-ft"]),
-        )
-    ]

@@ -32,26 +32,28 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     """
     folder = Path(folder)
     with reading(folder) as journal:
-        table = _exported(folder, _stand(journal))
+        table = _exported(folder / PARQUET, _stand(journal))
         if table is None:
             table = _table(journal)
     return _frame(table)
 
 
-def export(folder: Path) -> Path:
-    """Writes the table to flights.parquet, whole or not at all."""
+def export(folder: Path) -> None:
+    """Writes the table to flights.parquet, whole or not at all; nothing when no flight was added since."""
     import pyarrow.parquet as pq
 
     path = folder / PARQUET
+    with reading(folder) as journal:
+        stand = _stand(journal)
+        if _is_current(path, stand):
+            return
+        table = _table(journal).replace_schema_metadata({_STAND: stand})
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with reading(folder) as journal:
-            table = _table(journal).replace_schema_metadata({_STAND: _stand(journal)})
-        pq.write_table(table, partial)
+        pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-    return path
 
 
 def _stand(journal: sqlite3.Connection) -> bytes:
@@ -59,18 +61,26 @@ def _stand(journal: sqlite3.Connection) -> bytes:
     return str(number).encode()
 
 
-def _exported(folder: Path, stand: bytes) -> "pa.Table | None":
-    """What was exported, if nothing was flown since."""
+def _is_current(path: Path, stand: bytes) -> bool:
+    """Whether the exported table has all flights of the journal."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    path = folder / PARQUET
     try:
-        if (pq.read_schema(path).metadata or {}).get(_STAND) == stand:
-            return pq.read_table(path)
+        return (pq.read_schema(path).metadata or {}).get(_STAND) == stand
     except (OSError, pa.ArrowException):
-        return None  # none, or damaged: the journal has all of it
-    return None
+        return False  # none, or damaged: the journal has all of it
+
+
+def _exported(path: Path, stand: bytes) -> "pa.Table | None":
+    """What was exported, if no flight was added since."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_table(path) if _is_current(path, stand) else None
+    except (OSError, pa.ArrowException):
+        return None
 
 
 def _table(journal: sqlite3.Connection) -> "pa.Table":

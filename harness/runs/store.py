@@ -82,6 +82,7 @@ class Store:
             os.close(self._lock)
             raise
         self._begun: float | None = None  # when the first change was made that is not committed yet
+        self._grown = False  # flights are among those changes
         self._versions: set[str] = {i for (i,) in self._all("SELECT id FROM versions")}
         self._run = 0
 
@@ -127,6 +128,7 @@ class Store:
 
     def add(self, row: Row, how: Judged, version: str, position: int) -> None:
         """Keeps a row, for good within half a second."""
+        self._grown = True
         self._change(
             "INSERT OR REPLACE INTO flights VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
@@ -148,9 +150,10 @@ class Store:
         """Writes what is not written yet."""
         if self._begun is not None:
             with told(self.folder):
-                self._journal.execute("UPDATE changes SET number = number + 1")
+                if self._grown:
+                    self._journal.execute("UPDATE changes SET number = number + 1")
                 self._journal.execute("COMMIT")
-            self._begun = None
+            self._begun, self._grown = None, False
 
     def tick(self) -> None:
         """Commits what has waited long enough."""
