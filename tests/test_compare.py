@@ -186,7 +186,8 @@ def test_the_full_matrix_goes_all_the_way_when_reduced(tmp_path: Path) -> None:
     assert attributed["rungs"] == ["kinematic", "lagged", "coordinated", "sixdof"]
     added = [step["what"] for step in attributed["disturbances"] if step["plant"] == "sixdof"]
     assert list(dict.fromkeys(added)) == [
-        "wind 2 m/s", "turbulence light", "turbulence moderate", "sampling 0.2 s", "estimator ekf", "airspeed used measured",
+        "wind 2 m/s", "turbulence light", "turbulence moderate", "sampling 0.2 s", "estimator ekf",
+        "airspeed used measured",
     ]  # fmt: skip
     assert harness("report", out, "--markdown", tmp_path / "results.md").exit_code == 0
 
