@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+from typing import Any
 
 import click
 
@@ -15,13 +16,13 @@ def guard() -> None:
     """From now on a write that fails ends the command: quietly on a closed pipe, else as bad input with the reason."""
     if (out := sys.stdout) is not None:
         raw = io.BufferedWriter(_Stdout(out.fileno(), "w", closefd=False))
-        sys.stdout = io.TextIOWrapper(raw, out.encoding, out.errors, line_buffering=out.line_buffering)
+        sys.stdout = io.TextIOWrapper(raw, out.encoding, out.errors, line_buffering=out.isatty())
 
 
 class _Stdout(io.FileIO):
     """What fails here is no `OSError` of a file that a command handles."""
 
-    def write(self, content: object) -> int:
+    def write(self, content: Any) -> int:
         try:
             return super().write(content)
         except OSError as error:
