@@ -30,7 +30,8 @@ def flight(plant: str, seed: int = 0, metrics: Mapping[str, float] = QUIET, **se
     base = {
         "plant": plant, "aircraft": "ultra_stick_25e", "seed": seed, "duration_s": 100.0, "guidance_period_s": 0.05,
         "law.name": "smc", "law.gains": "paper", "law.k2": math.nan, "law.max_heading_rate_deg_s": 5.0,
-        "law.airspeed": "nominal", "start.airspeed_mps": 13.0, "start.heading_deg": 30.0 + seed,
+        "law.airspeed": "nominal", "law.standoff_m": 200.0, "start.airspeed_mps": 13.0,
+        "start.heading_deg": 30.0 + seed,
         "wind.steady_mps": (0.0, 0.0), "wind.turbulence": "none", "estimator.kind": "truth",
         **settings,
     }  # fmt: skip
@@ -119,7 +120,7 @@ def test_a_lost_flight_enters_with_the_worst_and_an_unconverged_one_with_its_dur
         flight("sixdof", 0, {**QUIET, "convergence_time_s": math.nan, "range_error_rms_m": 50.0, "turn_ratio": 0.8}),
         {**flight("sixdof", 1, lost), "outcome": "departed"},
     ]
-    table_ = entered(table(rows))
+    table_ = entered(table(rows), 0.25)
     assert list(table_["convergence_time_s"]) == [40.0, 100.0, 100.0]
     assert list(table_["converged"]) == [True, False, False]
     gone = table_.loc[2]
@@ -134,7 +135,7 @@ def test_a_lost_flight_gets_no_metric_that_its_plant_does_not_have() -> None:
         {**flight("kinematic", 0, without), "outcome": "target_lost"},
         flight("sixdof", 0, {**QUIET, "sideslip_rms_deg": 9.0}),
     ]
-    assert math.isnan(entered(table(rows))["sideslip_rms_deg"][0])
+    assert math.isnan(entered(table(rows), 0.25)["sideslip_rms_deg"][0])
 
 
 def test_what_is_set_is_an_axis_and_what_is_drawn_or_follows_is_none() -> None:
@@ -311,6 +312,33 @@ def test_where_neither_converges_the_time_says_nothing() -> None:
     assert card.finding("convergence").verdict == HOLDS
 
 
+def test_where_the_law_does_not_circle_on_the_baseline_the_cost_says_nothing() -> None:
+    """Half of the seeds fly away on every plant, each to somewhere else; the assumption's own parts count there too."""
+    flights = moved(over(), "range_error_rms_m", 1.0)
+    away = flights["seed"] < 6
+    flights.loc[away, "range_error_rms_m"] = 51.0 + 100.0 * (flights["plant"] == "sixdof")
+    flights.loc[away, "convergence_time_s"] = np.nan
+    (card,) = found(flights).scorecards
+    assert card.finding("settled_error").effect.pairs == SEEDS - 6
+    assert card.finding("settled_error").effect.mean == pytest.approx(1.0, abs=0.02)
+    assert card.finding("sideslip").effect.pairs == SEEDS
+    assert card.converged[0].of == SEEDS
+    (one,) = attributions(entered(flights, 0.25))
+    assert one.scenarios == SEEDS - 6
+    assert "6 of the pairs say nothing of the cost: the law does not circle" in "\n".join(lines(found(flights)))
+    flights.loc[away & (flights["plant"] == "kinematic"), "range_error_rms_m"] = 50.0  # a quarter of the 200 m
+    (card,) = found(flights).scorecards
+    assert card.finding("settled_error").effect.pairs == SEEDS  # one that leaves the circle of the baseline costs
+
+
+def test_where_no_flight_converges_convergence_is_not_measured() -> None:
+    flights = over(law__name=["smc", "nftsm"])
+    flights.loc[flights["law.name"] == "smc", "convergence_time_s"] = np.nan
+    (card,) = found(flights).scorecards
+    (cell,) = card.finding("convergence").cells
+    assert cell.at == {"law": "nftsm paper"}
+
+
 def test_one_flight_each_is_one_difference_without_interval() -> None:
     flights = over()
     flights = moved(flights[flights["seed"] == 0], "sideslip_rms_deg", 1.0, scatter=0.0)
@@ -349,7 +377,7 @@ def ladder() -> pd.DataFrame:
 
 
 def test_the_rungs_add_up_from_the_first_plant_to_the_last() -> None:
-    (one,) = attributions(entered(ladder()))
+    (one,) = attributions(entered(ladder(), 0.25))
     assert one.rungs == ("kinematic", "lagged", "coordinated", "sixdof")
     assert one.scenarios == 6 * 2 * 3
     error = next(ladder for ladder in one.ladders if ladder.metric == "range_error_rms_m")
@@ -361,7 +389,7 @@ def test_the_rungs_add_up_from_the_first_plant_to_the_last() -> None:
 def test_a_scenario_missing_on_one_rung_is_left_out_on_all() -> None:
     flights = ladder()
     gone = (flights["plant"] == "lagged") & (flights["seed"] == 2)
-    (one,) = attributions(entered(flights[~gone]))
+    (one,) = attributions(entered(flights[~gone], 0.25))
     assert one.scenarios == 5 * 2 * 3
     error = next(ladder for ladder in one.ladders if ladder.metric == "range_error_rms_m")
     assert error.start + sum(step.effect.mean for step in error.steps) == pytest.approx(error.end)
@@ -369,13 +397,13 @@ def test_a_scenario_missing_on_one_rung_is_left_out_on_all() -> None:
 
 def test_a_rung_that_was_not_flown_is_part_of_the_step_above() -> None:
     flights = ladder()
-    (one,) = attributions(entered(flights[flights["plant"].isin(["kinematic", "coordinated"])]))
+    (one,) = attributions(entered(flights[flights["plant"].isin(["kinematic", "coordinated"])], 0.25))
     (step,) = one.ladders[0].steps
     assert step.what == "lag of the heading rate, bank and airspeed dynamics"
 
 
 def test_each_disturbance_adds_what_it_adds_to_the_same_flight_without_it() -> None:
-    (one,) = attributions(entered(ladder()))
+    (one,) = attributions(entered(ladder(), 0.25))
     added = {
         (step.what, step.plant): step.effect.mean for step in one.disturbances if step.metric == "range_error_rms_m"
     }

@@ -21,6 +21,7 @@ class Combination(NamedTuple):
     position: int  # in the matrix, excluded ones counted
     values: Mapping[str, object]
     lines: Mapping[str, int]  # where each value stands
+    drawn: frozenset[str]  # the keys whose value is the seed's
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +86,9 @@ class Matrix:
         if number == 0 and any(all(values.get(k) == v for k, v in table.items()) for table in self.excluded):
             return None
         seed = _seed(values.get("seed", _table(self.file.document, "flight").get("seed", 0)))
-        for key, value in values.items():
-            if isinstance(value, Draw):
-                values[key] = value.value(stream(seed, f"matrix:{key}"))
-        return Combination(position, values, lines)
+        draws = {key: value for key, value in values.items() if isinstance(value, Draw)}
+        values |= {key: draw.value(stream(seed, f"matrix:{key}")) for key, draw in draws.items()}
+        return Combination(position, values, lines, frozenset(draws))
 
     @property
     def varies(self) -> dict[str, int]:

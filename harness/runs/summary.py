@@ -53,12 +53,14 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
     left_out: set[tuple[str, ...]] = set()
     with reading(folder) as journal:
         rows = journal.execute(
-            "SELECT f.outcome, f.settings, f.metrics FROM positions p JOIN flights f USING (key) "
+            "SELECT p.position, f.outcome, f.settings, f.metrics FROM positions p JOIN flights f USING (key) "
             "WHERE p.matrix = ? ORDER BY p.position",
             (matrix.identifier,),
         )
-        for outcome, settings, metrics in rows:
+        for position, outcome, settings, metrics in rows:
             flat = flat_settings(json.loads(settings))
+            combination = matrix.at(position)
+            flat |= dict.fromkeys(combination.drawn if combination else (), "drawn")
             labels = tuple(" ".join(_shown(flat.get(key)) for key in together) for together in keys)
             if labels not in groups and len(groups) == most:
                 left_out.add(labels)
@@ -86,7 +88,8 @@ class _Group:
 def _axes(matrix: Matrix) -> list[str]:
     """Those that vary and are not drawn over."""
     several = len(matrix.blocks) > 1  # an included flight may differ from the matrix in a key of one value
-    return [keys for keys, count in matrix.varies.items() if (several or count > 1) and keys != "seed"]
+    left_out = {"seed", *matrix.draws}
+    return [keys for keys, count in matrix.varies.items() if (several or count > 1) and keys not in left_out]
 
 
 def _shown(value: object) -> str:

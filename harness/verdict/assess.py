@@ -47,6 +47,14 @@ class Assess:
     convergence_time_margin: Annotated[
         float, Gt(0), About("relative to the baseline's mean. Part 60: 10 %, as of a yaw rate")
     ] = 0.10
+    circling_error: Annotated[
+        float,
+        Gt(0),
+        About(
+            "rms of the last half over the standoff distance; where the baseline's is larger its law does not circle, "
+            "and the pair says nothing of the cost. Ours: a quarter, beyond all that a law that circles was seen to do"
+        ),
+    ] = 0.25
     range_error_margin: Annotated[
         Metres, Gt(0), About("rms over the last half. Ours: 1 % of the standoff distance")
     ] = 2.0

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from harness.verdict.pairs import Pairs, ordered, pairs, settings_of, spread
+from harness.verdict.pairs import change, ordered, pairs, settings_of, spread
 from harness.verdict.statistics import Effect, effect
 
 METRICS: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -57,7 +57,9 @@ DISTURBANCES = (
     Disturbance("estimator", ("estimator.kind",), "estimator.kind"),
     Disturbance("airspeed used", ("law.airspeed",), "law.airspeed"),
 )
-_REFERENCE = {"wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
+REFERENCE: Mapping[str, object] = MappingProxyType(  # what is undisturbed, by `Disturbance.shown`
+    {"wind_speed_mps": 0.0, "wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,17 +112,18 @@ def attribution(flights: pd.DataFrame, name: str, law: str) -> Attribution:
 
 
 def _same_scenarios(flights: pd.DataFrame, rungs: Sequence[str]) -> dict[str, pd.DataFrame]:
-    """Per rung its flights, row by row the same scenario, and only those that every rung has."""
+    """Per rung its flights, row by row the same scenario: those that every rung has, and that circle on the first."""
     if not rungs:
         return {}
     first = flights["plant"] == rungs[0]
     if len(rungs) == 1:
-        return {rungs[0]: flights[first]}
+        return {rungs[0]: flights[first & flights["circles"]]}
     by_rung = []
     for above in rungs[1:]:
         two = flights[first | (flights["plant"] == above)]
         by_rung.append(pairs(two, ["plant"], two["plant"] == rungs[0]))
-    common = reduce(np.intersect1d, [paired.reference["key"].to_numpy() for paired in by_rung])
+    keys = [paired.reference["key"][paired.reference["circles"]].to_numpy() for paired in by_rung]
+    common = reduce(np.intersect1d, keys)
     return {
         rungs[0]: by_rung[0].reference.set_index("key", drop=False).loc[common],
         **{
@@ -131,13 +134,18 @@ def _same_scenarios(flights: pd.DataFrame, rungs: Sequence[str]) -> dict[str, pd
 
 
 def _ladder(metric: str, on: Mapping[str, pd.DataFrame]) -> Ladder:
+    """From the first rung to the last; a convergence time over the scenarios in which it says something on any."""
     rungs = list(on)
-    start, end = (_seed_mean(on[plant], metric) for plant in (rungs[0], rungs[-1]))
+    if metric == "convergence_time_s":
+        says = np.any([on[plant]["converged"] | on[plant]["lost"] for plant in rungs], axis=0)
+        on = {plant: on[plant][says] for plant in rungs}
+    values = {plant: on[plant][metric].to_numpy(float) for plant in rungs}
+    seeds = on[rungs[0]]["seed"].to_numpy()
     steps = tuple(
-        _step(metric, _between(below, above), above, Pairs(on[below], on[above], on[above].iloc[:0]))
+        Step(metric, _between(below, above), above, effect(values[above] - values[below], seeds, metric))
         for below, above in pairwise(rungs)
     )
-    return Ladder(metric, start, steps, end)
+    return Ladder(metric, _seed_mean(on[rungs[0]], metric), steps, _seed_mean(on[rungs[-1]], metric))
 
 
 def _between(below: str, above: str) -> str:
@@ -150,13 +158,6 @@ def _seed_mean(flights: pd.DataFrame, metric: str) -> float:
     return float(flights.groupby("seed")[metric].mean().mean())
 
 
-def _step(metric: str, what: str, plant: str, paired: Pairs) -> Step:
-    change = paired.other[metric].to_numpy(float) - paired.reference[metric].to_numpy(float)
-    there = ~np.isnan(change)
-    seeds = paired.other["seed"].to_numpy()[there]
-    return Step(metric, what, plant, effect(change[there], seeds, metric))
-
-
 def _disturbed(flights: pd.DataFrame, disturbance: Disturbance, rungs: Sequence[str]) -> Iterator[Step]:
     """Each level of the disturbance beside its absence, on the first rung and on the last."""
     present = [key for key in disturbance.keys if key in settings_of(flights)]
@@ -165,16 +166,16 @@ def _disturbed(flights: pd.DataFrame, disturbance: Disturbance, rungs: Sequence[
         return
     level = named[disturbance.shown]
     values = ordered(level)
-    reference = _REFERENCE.get(disturbance.shown, values[0])
-    if disturbance.shown == "wind_speed_mps" and reference != 0.0:
-        return  # no still air to compare with
+    reference = REFERENCE.get(disturbance.shown, values[0])
     for value in (value for value in values if value != reference):
         for plant in dict.fromkeys((rungs[0], rungs[-1])):
             those = flights[(flights["plant"] == plant) & level.isin([value, reference])]
             paired = pairs(those, present, level[those.index] == reference)
             if len(paired):
                 what = f"{disturbance.name} {_amount(disturbance, value)}"
-                yield from (_step(metric, what, plant, paired) for metric in METRICS)
+                seeds = paired.other["seed"].to_numpy()
+                for metric in METRICS:
+                    yield Step(metric, what, plant, effect(change(paired, metric), seeds, metric))
 
 
 def _amount(disturbance: Disturbance, value: object) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from harness.metrics import MEANING
 from harness.verdict.assess import Assess
 from harness.verdict.attribution import Attribution, attributions, rung
-from harness.verdict.pairs import FAILED, Pairs, axes, entered, plant_pairs, spread, varying
+from harness.verdict.pairs import FAILED, Pairs, axes, change, entered, plant_pairs, spread, varying
 from harness.verdict.parts import with_quantities
 from harness.verdict.scorecard import Scorecard, scorecards
 from harness.verdict.statistics import Effect, effect
@@ -69,7 +69,7 @@ class Comparison:
 
 def compare(flights: pd.DataFrame, assess: Assess, baseline: str = "kinematic") -> Comparison:
     """Of a directory's flights. Raises `CompareError` with what is missing."""
-    table = with_quantities(entered(flights))
+    table = with_quantities(entered(flights, assess.circling_error))
     paired = plant_pairs(table, baseline)
     failed = table["outcome"].isin(FAILED)
     return Comparison(
@@ -103,10 +103,7 @@ def _rows(paired: Pairs) -> Iterator[Row]:
             reference, other = those.reference[metric].to_numpy(float), those.other[metric].to_numpy(float)
             if np.isnan(other).all():
                 continue
-            change = other - reference
-            there = ~np.isnan(change)
-            seeds = those.other["seed"].to_numpy()[there]
-            found = effect(change[there], seeds, metric)
+            found = effect(change(those, metric), those.other["seed"].to_numpy(), metric)
             yield Row(str(aircraft), str(label), str(plant), metric, _mean(reference), _mean(other), found)
 
 

@@ -13,7 +13,6 @@ from harness.verdict.attribution import METRICS, Attribution, Ladder, Step
 from harness.verdict.comparison import Comparison
 from harness.verdict.pairs import spread
 from harness.verdict.parts import PARTS
-from harness.verdict.scorecard import differences
 from harness.verdict.words import plain, signed
 
 INK, GREY, UP, DOWN, BAND = "#1c2733", "#9aa5b1", "#c4501b", "#2a6f97", "#dfe8d8"
@@ -121,9 +120,12 @@ def distributions(figure: Figure, comparison: Comparison, plant: str) -> None:
     laws = list(dict.fromkeys(law for _, law in kinds))
     panels = figure.subplots(1, len(parts), sharey=True, squeeze=False)[0]
     for axes, part in zip(panels, parts, strict=True):
-        values, says = differences(part, pairs)
+        values = part.difference(pairs)
         for airframe, law in kinds:
-            of = says & ((named["aircraft"] == airframe) & (named.get("law", named["plant"]) == law)).to_numpy()
+            of = (
+                ~np.isnan(values)
+                & ((named["aircraft"] == airframe) & (named.get("law", named["plant"]) == law)).to_numpy()
+            )
             if not of.any():
                 continue
             share = np.linspace(0.0, 1.0, min(_MOST_POINTS, max(2, int(of.sum()))))

@@ -8,15 +8,27 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from harness.metrics import MEANING
 from harness.plant import Outcome
 
 RESULTS = ("key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds", "run", "version")
-ENTERED = ("lost", "converged")  # the columns that `entered` adds
+ENTERED = ("lost", "converged", "circles")  # the columns that `entered` adds
 QUANTITIES = ("airspeed_deviation", "lag_times_k2", "bank_beyond_deg", "lost_share", "converged_share")  # of `parts`
 LOST = (Outcome.GROUND.value, Outcome.DEPARTED.value, Outcome.TARGET_LOST.value)
 FAILED = tuple(outcome.value for outcome in Outcome if outcome.failed)
+OF_A_CIRCLE = frozenset(  # metrics that mean something only where the law circles its target
+    {
+        "convergence_time_s",
+        "range_error_final_m",
+        "range_error_rms_m",
+        "range_error_peak_m",
+        "overshoot_m",
+        "saturation_fraction",
+        "command_activity_deg_s2",
+    }
+)
 IDEAL: Mapping[str, float] = MappingProxyType({"heading_rate_gain": 1.0, "turn_ratio": 1.0})  # of the rest, zero
 BOUNDED: Mapping[str, float] = MappingProxyType({"saturation_fraction": 1.0})  # the worst that can be
 
@@ -89,8 +101,10 @@ def pairs(flights: pd.DataFrame, differing: Sequence[str], is_reference: pd.Seri
     )
 
 
-def entered(flights: pd.DataFrame) -> pd.DataFrame:
+def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     """The flights as they enter a comparison: every number there that a comparison needs.
+
+    A flight circles when it lasts and its settled error is below `circling` times the standoff distance.
 
     A flight that has not converged when it ends, or has ended early, enters with its duration as convergence time
     (censored). One that ended early (ground, departed, target lost) enters every other metric that its plant has with
@@ -100,6 +114,7 @@ def entered(flights: pd.DataFrame) -> pd.DataFrame:
     table = flights.copy()
     lost = table["outcome"].isin(LOST)
     table["lost"] = lost
+    table["circles"] = (table["range_error_rms_m"] <= circling * table["law.standoff_m"]) & ~lost
     table["converged"] = table["convergence_time_s"].notna() & ~lost
     table["convergence_time_s"] = table["convergence_time_s"].where(table["converged"], table["duration_s"])
     table["overshoot_m"] = table["overshoot_m"].fillna(0.0)
@@ -116,6 +131,22 @@ def entered(flights: pd.DataFrame) -> pd.DataFrame:
 def _worst(measured: pd.Series, ideal: float) -> float:
     values = measured.to_numpy(float)
     return float(values[np.abs(values - ideal).argmax()]) if len(values) else math.nan
+
+
+def change(pairs: Pairs, metric: str) -> NDArray[np.float64]:
+    """Other minus reference, of a metric or another column; NaN where the pair says nothing of it.
+
+    That is where one of the flights has no such thing; of what is `OF_A_CIRCLE`, where the reference does not circle;
+    of the convergence time, where both flights last and neither converges.
+    """
+    before, after = pairs.reference, pairs.other
+    values = after[metric].to_numpy(float) - before[metric].to_numpy(float)
+    says = np.ones(len(pairs), bool)
+    if metric in OF_A_CIRCLE:
+        says &= before["circles"].to_numpy(bool)
+    if metric == "convergence_time_s":
+        says &= (before["converged"] | after["converged"].to_numpy() | after["lost"].to_numpy()).to_numpy(bool)
+    return np.where(says, values, np.nan)
 
 
 def spread(flights: pd.DataFrame) -> pd.DataFrame:

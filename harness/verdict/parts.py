@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 import aircraft
 from harness.verdict.assess import Assess
+from harness.verdict.pairs import Pairs, change
 
 Bounds = tuple[float | None, float | None]
 
@@ -28,9 +30,11 @@ class Part:
     consequence: bool = False
     tested: bool = True  # False: a setting, or a share of flights, of which a cell has too few for a test
 
-    def difference(self, reference: pd.DataFrame, other: pd.DataFrame) -> pd.Series:
-        """Other minus what is assumed of it; NaN where it was not measured."""
-        return other[self.column] - (reference[self.column] if self.assumed is None else self.assumed)
+    def difference(self, pairs: Pairs) -> NDArray[np.float64]:
+        """Other minus what is assumed of it; NaN where the pair says nothing."""
+        if self.assumed is None:
+            return change(pairs, self.column)
+        return pairs.other[self.column].to_numpy(float) - self.assumed
 
 
 def _up_to(limit: Callable[[Assess], float]) -> Callable[[Assess], Bounds]:

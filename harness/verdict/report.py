@@ -6,13 +6,15 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+import pandas as pd
+
 from harness.metrics import MEANING
 from harness.settings.written import written
 from harness.template import template
 from harness.verdict import figures, words
 from harness.verdict.attribution import METRICS, Attribution
 from harness.verdict.comparison import Comparison, Row, axes_of
-from harness.verdict.pairs import axes, spread
+from harness.verdict.pairs import axes, change, spread
 from harness.verdict.scorecard import Finding, Scorecard, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
 
@@ -191,15 +193,17 @@ def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
 def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
     """Rows of the pairs, and why each was chosen."""
     chosen: dict[int, list[str]] = {}
-    other, reference = comparison.pairs.other, comparison.pairs.reference
+    other = comparison.pairs.other
+    metrics = ("range_error_rms_m", "convergence_time_s", "command_activity_deg_s2")
+    changes = pd.DataFrame({metric: change(comparison.pairs, metric) for metric in metrics}, index=other.index)
     for rows in other.groupby(["aircraft", "plant"]).groups.values():
-        for metric in ("range_error_rms_m", "convergence_time_s", "command_activity_deg_s2"):
-            change = (other.loc[rows, metric] - reference.loc[rows, metric]).sort_values()
-            if change.iloc[-1] > 0:
-                _add(chosen, change.index[-1], f"{METRICS[metric][0]} worst, {words.signed(change.iloc[-1])}")
-            if metric == "range_error_rms_m":
-                middle = change.index[len(change) // 2]
-                _add(chosen, middle, f"{METRICS[metric][0]} in the middle, {words.signed(change.loc[middle])}")
+        for metric in metrics:
+            ranked = changes.loc[rows, metric].dropna().sort_values()
+            if len(ranked) and ranked.iloc[-1] > 0:
+                _add(chosen, ranked.index[-1], f"{METRICS[metric][0]} worst, {words.signed(ranked.iloc[-1])}")
+            if len(ranked) and metric == "range_error_rms_m":
+                middle = ranked.index[len(ranked) // 2]
+                _add(chosen, middle, f"{METRICS[metric][0]} in the middle, {words.signed(ranked.loc[middle])}")
     for index in other.index[other["lost"]]:
         _add(chosen, index, str(other.loc[index, "reason"]) or "ended early")
     return chosen

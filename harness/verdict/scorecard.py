@@ -150,33 +150,20 @@ def _groups(table: pd.DataFrame, columns: list[str]) -> Groups:
     return [({c: table[c].iloc[indices[0]] for c in columns}, indices) for indices in rows]
 
 
-def differences(part: Part, pairs: Pairs) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The pairs' differences, and which of them say something of the part.
-
-    A part that the plant does not have, or that the flight did not excite, says nothing; nor does a convergence time
-    of a pair in which both flights last and neither converges.
-    """
-    values = part.difference(pairs.reference, pairs.other).to_numpy(float)
-    says = ~np.isnan(values)
-    if part.name == "convergence_time":
-        says &= (pairs.reference["converged"] | pairs.other["converged"] | pairs.other["lost"]).to_numpy()
-    return values, says
-
-
 def _effect(part: Part, pairs: Pairs) -> Effect:
-    values, says = differences(part, pairs)
-    return effect(values[says], pairs.other["seed"].to_numpy()[says], part.column)
+    return effect(part.difference(pairs), pairs.other["seed"].to_numpy(), part.column)
 
 
 def _cells(part: Part, pairs: Pairs, groups: Groups, assess: Assess) -> Iterator[Cell]:
     """The cells that say something of the part; `p` not adjusted yet."""
-    values, says = differences(part, pairs)
+    values = part.difference(pairs)
     lost, several = pairs.other["lost"].to_numpy(), pairs.other["seed"].nunique() > 1
+    converges = pairs.reference["converged"].to_numpy(bool) | pairs.other["converged"].to_numpy(bool)
     low, high = part.bounds(assess)
     scale = pairs.reference[part.column].to_numpy(float) if part.relative else np.ones(len(values))
     for at, rows in groups:
-        rows = rows[says[rows]]
-        if not len(rows):
+        rows = rows[~np.isnan(values[rows])]
+        if not len(rows) or (part.name == "convergence" and not converges[rows].any()):
             continue
         d, s = values[rows], scale[rows]
         above = d - low * s if low is not None else d[:0]

@@ -43,10 +43,12 @@ class Share(NamedTuple):
 
 
 def effect(values: Array, seeds: Sequence[object] | NDArray[np.generic], purpose: str) -> Effect:
-    """The mean over the seeds' means, with a BCa interval from the random stream of `purpose`."""
+    """The mean over the seeds' means, with a BCa interval from the random stream of `purpose`. NaN counts as absent."""
+    there = ~np.isnan(values)
+    values = values[there]
     if not len(values):
         return Effect(np.nan, None, None, 0, 0, "no pairs")
-    labels, belongs = np.unique(np.asarray(seeds), return_inverse=True)
+    labels, belongs = np.unique(np.asarray(seeds)[there], return_inverse=True)
     means = np.bincount(belongs, weights=values) / np.bincount(belongs)
     mean, count = float(means.mean()), len(labels)
     why = ""

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from harness.commands.telling import number
+from harness.verdict.attribution import REFERENCE
 from harness.verdict.comparison import Comparison, Left, Row
 from harness.verdict.scorecard import HOLDS, IF, NOT, UNMEASURED, UNSHOWN, Cell, Finding, Scorecard, shown
 from harness.verdict.statistics import Effect, Share
@@ -15,23 +16,32 @@ def answer(comparison: Comparison) -> list[str]:
     """Three sentences: does the assumption hold, what breaks first, what does it cost."""
     cards = comparison.answering
     beside = f"{comparison.last_plant} beside {comparison.baseline}, {sum(card.pairs for card in cards)} pairs"
+    whole = "As a whole" if all(map(_holds_all, cards)) else "Not as a whole"
     return [
-        f"Does it hold? {_sentence(map(_holds, cards))} ({beside}).",
+        f"Does it hold? {whole} ({beside}): {'; '.join(map(_holds, cards))}.",
         f"What breaks first? {_sentence(map(_first, cards))}.",
         f"What does it cost? {_sentence(map(_costs, cards))}.",
     ]
 
 
+def _of_the_assumption(card: Scorecard) -> list[Finding]:
+    return [finding for finding in card.findings if not finding.part.consequence and finding.verdict != UNMEASURED]
+
+
+def _holds_all(card: Scorecard) -> bool:
+    return all(finding.verdict == HOLDS for finding in _of_the_assumption(card))
+
+
 def _holds(card: Scorecard) -> str:
-    parts = [finding for finding in card.findings if not finding.part.consequence and finding.verdict != UNMEASURED]
+    parts = _of_the_assumption(card)
     counted = {verdict: sum(f.verdict == verdict for f in parts) for verdict in (HOLDS, IF, NOT, UNSHOWN)}
-    if counted[HOLDS] == len(parts):
+    if _holds_all(card):
         return f"on {card.aircraft} all {len(parts)} parts hold"
     said = [f"{counted[HOLDS]} of {len(parts)} parts hold"]
     said += [f"{counted[IF]} under a condition"] if counted[IF] else []
     said += [f"{counted[NOT]} {'do' if counted[NOT] > 1 else 'does'} not"] if counted[NOT] else []
     said += [f"{counted[UNSHOWN]} not shown"] if counted[UNSHOWN] else []
-    return f"on {card.aircraft} not as a whole: {_and(said)}"
+    return f"on {card.aircraft} {_and(said)}"
 
 
 def breaks_first(card: Scorecard) -> Finding | None:
@@ -48,13 +58,19 @@ def _first(card: Scorecard) -> str:
     worst = finding.worst
     return (
         f"on {card.aircraft} {finding.part.title}: it fails in {finding.failed} of {len(finding.cells)} cells{where}, "
-        f"at worst with {measured(worst.mean, finding)} where {bound(worst)} is asked{place(worst)}"
+        f"at worst with {measured(worst.mean, finding)} where {bound(worst)} is asked"
+        f"{' at ' if worst.at else ''}{place(worst)}"
     )
 
 
 def place(cell: Cell) -> str:
-    """Where a cell is, or nothing when there is but one."""
-    return f" at {', '.join(f'{axis} = {shown(value)}' for axis, value in cell.at.items())}" if cell.at else ""
+    """Where a cell is, without what is as in `REFERENCE`; nothing when there is but one."""
+    said = [
+        shown(value) if axis == "law" else f"{axis} = {shown(value)}"
+        for axis, value in cell.at.items()
+        if axis not in REFERENCE or value != REFERENCE[axis]
+    ]
+    return ", ".join(said)
 
 
 def _costs(card: Scorecard) -> str:
@@ -153,6 +169,12 @@ def heading(comparison: Comparison) -> Iterator[str]:
     infeasible = int((comparison.pairs.other["feasibility_margin_deg_s"] < 0.0).sum())
     if infeasible:
         yield f"{infeasible} of the pairs are of circles that the heading-rate limit cannot hold"
+    astray = int((~comparison.pairs.reference["circles"].astype(bool)).sum())
+    if astray:
+        yield (
+            f"{astray} of the pairs say nothing of the cost: the law does not circle the target on "
+            f"{comparison.baseline} either"
+        )
     yield from _left("have no partner", comparison.unpaired)
     yield from _left("failed and are in no pair", comparison.failed)
 
