@@ -14,7 +14,7 @@ from harness.flight import IDENTIFIED_PLANTS, Flight
 from harness.settings import document
 
 PHYSICS = 2  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
-METRICS = 1  # of what a log is judged by: raised whenever a change there moves a metric
+METRICS = 2  # of what a log is judged by: raised whenever a change there moves a metric
 
 
 class Version(NamedTuple):

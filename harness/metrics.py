@@ -36,6 +36,7 @@ SETTLED_FOR = 5.0  # s
 AVERAGED_OVER = 0.25  # s
 LONGEST_LAG = 2.0  # s
 LEAST_EXCITATION = np.radians(0.5)  # rad/s: a command, or a turn, that varies less tells nothing of lag or ratio
+LEAST_EXPLAINED = 0.5  # share of the flown rate's variation: a command that explains less tells nothing of the lag
 GRAVITY = 9.80665
 
 
@@ -91,7 +92,8 @@ def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | 
     """The delay at which the command explains most of the flown rate's variation, and the ratio there.
 
     Both by least squares, and exact for a pure delay: over a period, a held command delayed by a share of a period is
-    a mix of two neighbours.
+    a mix of two neighbours. A slow command tells the ratio, not the delay: it has to change by `LEAST_EXCITATION`
+    within `AVERAGED_OVER`; nor does one tell it that gusts outweigh.
     """
     longest = min(round(LONGEST_LAG / period), len(command) // 2)
     if longest < 1 or np.std(command) < LEAST_EXCITATION:
@@ -101,7 +103,11 @@ def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | 
     n = int(np.argmax(explained))
     u, later = (command[longest - k : len(command) - k] for k in (n, n + 1))
     mixed = (1.0 - share[n]) * u + share[n] * later
-    return float((n + share[n]) * period), float(mixed @ y) / max(float(mixed @ mixed), 1e-300)
+    gain = float(mixed @ y) / max(float(mixed @ mixed), 1e-300)
+    apart = max(1, round(AVERAGED_OVER / period))
+    is_quick = np.std(command[apart:] - command[:-apart]) >= LEAST_EXCITATION
+    is_told = is_quick and explained[n] >= LEAST_EXPLAINED * len(y) * np.var(y)
+    return float((n + share[n]) * period) if is_told else None, gain
 
 
 def _mixes(command: Array, y: Array, longest: int) -> tuple[Array, Array]:

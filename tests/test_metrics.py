@@ -70,7 +70,7 @@ def test_activity_is_total_variation_per_second() -> None:
 
 @pytest.mark.parametrize(("lag", "gain"), [(0.0, 1.0), (0.3, 0.9), (0.425, 1.05)])
 def test_lag_and_gain_of_a_delayed_turn_are_found(lag: float, gain: float) -> None:
-    amplitude, w = 0.06, 0.4
+    amplitude, w = 0.06, 1.2
     command = amplitude * np.cos(w * (TIME + 0.025))  # the held command, at the middle of its period
     heading = 0.3 + gain * amplitude / w * np.sin(w * (TIME - lag))
     judged = metrics(log_of(heading_rate_command=command, unlimited_command=command, heading=heading))
@@ -87,6 +87,25 @@ def test_lag_and_gain_of_a_held_command_with_a_pure_delay_are_exact(lag: float) 
     judged = metrics(log_of(heading_rate_command=command, unlimited_command=command, heading=heading))
     assert judged["heading_rate_lag_s"] == pytest.approx(lag, abs=1e-9)
     assert judged["heading_rate_gain"] == pytest.approx(0.9, abs=1e-9)
+
+
+def test_a_slow_command_tells_the_gain_and_not_the_lag() -> None:
+    """SMC's: it moves by a degree per second in a quarter of a minute."""
+    command = 0.06 * np.cos(0.2 * TIME)
+    heading = 0.9 * 0.06 / 0.2 * np.sin(0.2 * (TIME - 0.3))
+    judged = metrics(log_of(heading_rate_command=command, unlimited_command=command, heading=heading))
+    assert judged["heading_rate_lag_s"] is None
+    assert judged["heading_rate_gain"] == pytest.approx(0.9, rel=0.01)
+
+
+@pytest.mark.parametrize(("gusts", "is_told"), [(0.5, True), (2.0, False)])
+def test_a_command_that_gusts_outweigh_tells_nothing_of_lag(gusts: float, is_told: bool) -> None:
+    noise = np.random.default_rng(1)
+    command = 0.05 * noise.choice([-1.0, 1.0], len(TIME))
+    turned = np.concatenate([[0.0], 0.05 * np.cumsum(command + gusts * 0.05 * noise.normal(size=len(TIME)))])
+    heading = np.interp(TIME - 0.3, np.arange(len(turned)) * 0.05, turned)
+    judged = metrics(log_of(heading_rate_command=command, unlimited_command=command, heading=heading))
+    assert (judged["heading_rate_lag_s"] is not None) == is_told
 
 
 def test_a_constant_command_tells_nothing_of_lag() -> None:
