@@ -9,7 +9,7 @@ from typing import NamedTuple
 from harness.commands.telling import number
 from harness.flight import Flight, feasibility_margin, needed_rate
 from harness.flight_log import FlightLog
-from harness.metrics import metrics
+from harness.metrics import TABLE, metrics
 from harness.settings import flight_from_document
 from harness.simulation import simulate
 
@@ -80,26 +80,12 @@ def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
             yield path
 
 
-SHOWN: Mapping[str, tuple[str, str, float]] = MappingProxyType(
-    {  # heading, unit in the table, how many of them make the metric's own unit
-        "convergence_time_s": ("settles", "s", 1.0),
-        "range_error_rms_m": ("error", "m rms", 1.0),
-        "range_error_peak_m": ("error", "m peak", 1.0),
-        "overshoot_m": ("overshoot", "m", 1.0),
-        "saturation_fraction": ("saturated", "%", 100.0),
-        "command_activity_deg_s2": ("activity", "deg/s2", 1.0),
-        "bank_peak_deg": ("bank", "deg peak", 1.0),
-        "sideslip_peak_deg": ("sideslip", "deg peak", 1.0),
-    }
-)
-
-
 def table(flown: list[Flown]) -> list[str]:
     """One case side by side, a line per flight: settling to 1 m; error, saturation and activity over the last half."""
     label = 8 + max(len(f.plant) for f in flown)
-    lines = ["".join([" " * label, *(f"{SHOWN[m][row]:>10}" for m in SHOWN)]) for row in (0, 1)]
+    lines = ["".join([" " * label, *(f"{TABLE[m][row]:>10}" for m in TABLE)]) for row in (0, 1)]
     for one in flown:
-        cells = (number(_scaled(one.metrics[m], SHOWN[m][2])) for m in SHOWN)
+        cells = (number(_scaled(one.metrics[m], TABLE[m][2])) for m in TABLE)
         lines.append("".join([f"{one.law:8}{one.plant:{label - 8}}", *(f"{cell:>10}" for cell in cells)]))
     return lines
 

@@ -42,7 +42,7 @@ def settings(folder: Path, count: int, duration: float = 2.0, plant: str = "kine
 
 
 def flown(file: Path, out: Path, **options: object) -> Progress:
-    *_, progress = run(read_matrix(read_settings(file)), out, Options(**{"workers": 2, "log": "none", **options}))  # type: ignore[arg-type]
+    *_, progress = run(read_matrix(read_settings(file)), out, Options(**{"workers": 2, "log": "none", **options}))
     return progress
 
 
@@ -101,7 +101,7 @@ def runs_of(out: Path) -> dict[str, int]:
 def until(condition: object, process: subprocess.Popen[str], within: float = 60.0) -> None:
     """Waits until `condition()` holds."""
     end = time.monotonic() + within
-    while not condition():  # type: ignore[operator]
+    while not condition():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
         time.sleep(0.02)

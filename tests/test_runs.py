@@ -55,7 +55,7 @@ def command(*words: object) -> subprocess.CompletedProcess[str]:
 def flown(file: Path, out: Path, *overrides: str, workers: int = 0, **options: object) -> Progress:
     """In this process, or by workers."""
     matrix = read_matrix(read_settings(file, overrides))
-    *_, progress = run(matrix, out, Options(workers=workers, log=options.pop("log", "none"), **options))  # type: ignore[arg-type]
+    *_, progress = run(matrix, out, Options(workers=workers, log=options.pop("log", "none"), **options))
     return progress
 
 
@@ -74,9 +74,11 @@ def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: P
     results = harness.load_results(out)
     assert len(results) == 10
     assert {f"{key}.rrd" for key in results["key"]} == {path.name for path in (out / "flights").iterdir()}
+    exported = (out / PARQUET).stat().st_mtime_ns
     again = command("run", file, "--out", out, "--workers", 2)
     assert again.returncode == 0
     assert "0 flown, 10 earlier, 0 failed" in again.stdout
+    assert (out / PARQUET).stat().st_mtime_ns == exported  # there was nothing to add
     pd.testing.assert_frame_equal(harness.load_results(out), results)
 
 
@@ -107,10 +109,13 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
     assert answer["metrics"]["bank_peak_deg"] == row["bank_peak_deg"]
     other = json.loads(command("fly", place, "--json", "--set", "plant=kinematic").stdout)
     assert other["key"] == harness.load_results(out).iloc[0]["key"]
-    told = command("show", place).stdout
-    assert "It flew to its end." in told
-    assert "sixdof ultra_stick_25e" in told
-    assert "bank_peak_deg" in told
+    told = command("show", place)
+    assert told.returncode == 0, told.stderr
+    for word in ("It flew to its end.", "sixdof ultra_stick_25e", "bank_peak_deg", row["digest"]):
+        assert word in told.stdout
+    listed = command("show", out).stdout.splitlines()
+    assert len(listed) == 1 + 10
+    assert [row["key"][:8], "sixdof", "0"] == listed[2].split()[:3]
 
 
 @pytest.mark.parametrize("key", ["", "zz", "f" * 40])
@@ -162,13 +167,13 @@ def own_copy(tmp_path: Path) -> Path:
 
 
 def in_copy(copy: Path, *words: object) -> str:
-    """The command, of the copy; its last line."""
+    """The command, of the copy: of `run` what it flew, else its last line."""
     done = subprocess.run(
         [sys.executable, "-m", "harness", *map(str, words)],
         cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()[-1] if words[0] == "run" else done.stderr.splitlines()[-1]
+    return done.stdout.splitlines()[-2] if words[0] == "run" else done.stderr.splitlines()[-1]
 
 
 def test_an_edited_law_inner_loop_airframe_or_track_is_a_new_flight_and_a_mix_is_told(

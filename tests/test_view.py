@@ -40,7 +40,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for plant, log in (("kinematic", "all"), ("sixdof", "none")):
         file.write_text(MATRIX.format(plant=plant), encoding="utf-8")
         matrix = read_matrix(read_settings(file, ()))
-        for _ in run(matrix, folder / "out", Options(workers=0, log=log)):  # type: ignore[arg-type]
+        for _ in run(matrix, folder / "out", Options(workers=0, log=log)):
             pass
     return folder / "out"
 

@@ -55,6 +55,8 @@ def fly(
     if not live and (pace is not None or port is not None):
         raise BadInput("--pace and --port are of --live: add it")
     place = place_of(what)
+    if not place and Path(what).is_dir():
+        raise BadInput(f"{what}: is a directory; a flight of it is {what}:KEY, by `harness show {what}`")
     recalled = _recalled(place) if place else None
     settings = recalled.file(what, overrides) if recalled else read_file(Path(what), overrides)
     flight = flight_of(settings)

@@ -116,21 +116,23 @@ def tell_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     from rich.table import Table
 
     from harness.commands.telling import number
-    from harness.runs.summary import SHOWN, summary
+    from harness.metrics import TABLE
+    from harness.plant import Outcome
+    from harness.runs.summary import summary
 
     results = summary(matrix, out, _MOST_LINES)
     ended = any(set(line.outcomes) != {"completed"} for line in results.lines)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 2, 0, 0))
     for keys in results.axes:
         table.add_column(", ".join(key.rpartition(".")[2] for key in keys.split(", ")), no_wrap=True)
-    table.add_column("settle", justify="right", no_wrap=True)
-    for heading, unit, _ in SHOWN.values():
+    table.add_column("settled", justify="right", no_wrap=True)
+    for heading, unit, _ in TABLE.values():
         table.add_column(f"{heading}\n{unit}", justify="right", no_wrap=True)
     if ended:
         table.add_column("ended", no_wrap=True)
     for line in results.lines:
         cells = [*line.labels, f"{line.settled} of {line.flights}"]
-        for name, (_, _, scale) in SHOWN.items():
+        for name, (_, _, scale) in TABLE.items():
             value = line.medians[name]
             cells.append(number(None if value is None else scale * value))
         if ended:
@@ -143,7 +145,11 @@ def tell_results(matrix: Matrix, out: Path, progress: Progress) -> None:
         click.echo(f"failed: {count} x {reason}")
     for problem in progress.recordings[:_MOST_REASONS]:
         click.echo(f"warning: {problem}", err=True)
+    lost = sum(count for line in results.lines for outcome, count in line.outcomes.items() if Outcome(outcome).failed)
+    if lost:
+        click.echo(f"{lost} results are failures; --retry failed flies them again")
     click.echo(f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}")
+    click.echo(f"to go on: harness show {out}, harness compare {out}")
 
 
 def _duration(seconds: float) -> str:

@@ -3,8 +3,8 @@
 from harness.flight import Flight
 
 CHUNK = 0.3  # s of flights in one message to a worker
-# Seconds on the machine of `make bench`: per guidance period of any plant, per step of JSBSim, per measurement.
-_PERIOD, _STEP, _SAMPLE = 6e-6, 6.5e-6, 60e-6
+# Seconds on the machine of `make bench`: of any plant per guidance period, per step of JSBSim, gust, measurement.
+_PERIOD, _STEP, _GUST, _SAMPLE = 6e-6, 6.5e-6, 1e-6, 60e-6
 _RUNGS = {"lagged": 20e-6, "coordinated": 45e-6}  # per guidance period, or per 50 ms of a longer one
 _BEGIN, _LOAD = 0.003, 0.012  # of any flight, metrics and digest included; of loading and trimming an airframe
 _FORGETTING = 0.2
@@ -28,11 +28,13 @@ class Estimate:
 
 def guess(flight: Flight) -> float:
     """Seconds on a machine like that of `make bench`."""
-    seconds = _BEGIN + flight.periods * _PERIOD
+    seconds, steps = _BEGIN + flight.periods * _PERIOD, flight.duration / flight.step
     if flight.plant in _RUNGS:
         seconds += _LOAD + max(flight.periods, flight.duration / 0.05) * _RUNGS[flight.plant]
     if flight.plant == "sixdof":
-        seconds += _LOAD + flight.duration / flight.step * _STEP
+        seconds += _LOAD + steps * _STEP
+    if flight.wind.turbulence != "none":
+        seconds += steps * _GUST
     if flight.estimator.kind == "ekf":
         seconds += flight.duration / flight.estimator.period * _SAMPLE
     return seconds

@@ -64,7 +64,7 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
     yield f"at {run['started']}, commit {run['git_commit'] or 'unknown'}{dirty}"
     yield f"on {run['platform']}, Python {run['python']}"
     if stored.seconds is not None:
-        yield f"in {row['seconds']:.3g} s; digest {row['digest'] or 'none'}"
+        yield f"in {stored.seconds:.3g} s; digest {row['digest'] or 'none'}"
     path = recording_path(folder, row["key"])
     yield (
         f"recording: {path}"

@@ -4,24 +4,12 @@ import json
 import statistics
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
+from harness.metrics import TABLE
 from harness.runs.matrix import Matrix
 from harness.runs.results import flat_settings
 from harness.runs.store import reading
-
-SHOWN: Mapping[str, tuple[str, str, float]] = MappingProxyType(
-    {  # heading, unit, how many of them make the metric's own unit
-        "convergence_time_s": ("after", "s", 1.0),
-        "range_error_rms_m": ("error", "m rms", 1.0),
-        "range_error_peak_m": ("error", "m peak", 1.0),
-        "saturation_fraction": ("saturated", "%", 100.0),
-        "command_activity_deg_s2": ("activity", "deg/s2", 1.0),
-        "bank_peak_deg": ("bank", "deg peak", 1.0),
-        "sideslip_peak_deg": ("sideslip", "deg peak", 1.0),
-    }
-)
 
 
 class Line(NamedTuple):
@@ -72,7 +60,7 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
 class _Group:
     def __init__(self) -> None:
         self._outcomes: dict[str, int] = {}
-        self._values: dict[str, list[float]] = {name: [] for name in SHOWN}
+        self._values: dict[str, list[float]] = {name: [] for name in TABLE}
 
     def add(self, outcome: str, metrics: Mapping[str, float | None]) -> None:
         self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1
