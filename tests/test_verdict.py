@@ -222,6 +222,20 @@ def test_severities_have_an_order_and_words_have_none() -> None:
     assert conclusion(cells({("a",): True, ("b",): False, ("c",): True}, ("law",)), words) == (IF, "law is a or c")
 
 
+def test_a_condition_says_at_what_else_alone_its_cells_were_flown() -> None:
+    """Radii were flown at the highest limit, the long period at the lowest and in still air."""
+    names = ("limit", "radius", "period", "wind_speed_mps")
+    at = {
+        (5.0, 200.0, 0.05, 0.0): False, (5.0, 200.0, 0.2, 0.0): True, (5.0, 200.0, 0.05, 2.0): False,
+        (20.0, 200.0, 0.05, 2.0): False, (20.0, 60.0, 0.05, 0.0): False,
+    }  # fmt: skip
+    across: dict[str, list[object]] = {name: sorted({v[i] for v in at}) for i, name in enumerate(names)}
+    assert conclusion(cells(at, names), across) == (
+        IF,
+        "period >= 0.2, flown only at limit = 5, radius = 200, undisturbed",
+    )
+
+
 def test_undecided_cells_alone_do_not_refute() -> None:
     at = {(value,): False for value in LIMITS["limit"]}
     assert conclusion(cells(at, ("limit",), beyond=False), LIMITS) == (UNSHOWN, "")
@@ -251,9 +265,10 @@ def test_a_part_holds_if_the_limit_is_low_enough() -> None:
     assert breaks_first(card) is sideslip_found
     said = answer(found(flights))
     assert len(said) == 3
-    assert (
-        "zero sideslip: it fails in 1 of 3 cells (it holds if law.max_heading_rate_deg_s <= 10), at worst with"
-        in said[1]
+    assert said[1].startswith("What breaks first? Zero sideslip fails on ultra_stick_25e in 1 of 3 cells (at worst +4")
+    assert said[1].endswith(
+        "not if law.max_heading_rate_deg_s <= 10), where at most 2 is asked, furthest out on ultra_stick_25e at "
+        "law.max_heading_rate_deg_s = 20."
     )
 
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from harness.verdict.pairs import change, ordered, pairs, settings_of, spread
+from harness.verdict.pairs import REFERENCE, change, ordered, pairs, settings_of, spread
 from harness.verdict.statistics import Effect, effect
 
 METRICS: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -56,9 +56,6 @@ DISTURBANCES = (
     Disturbance("sampling", ("guidance_period_s",), "guidance_period_s"),
     Disturbance("estimator", ("estimator.kind",), "estimator.kind"),
     Disturbance("airspeed used", ("law.airspeed",), "law.airspeed"),
-)
-REFERENCE: Mapping[str, object] = MappingProxyType(  # what is undisturbed, by `Disturbance.shown`
-    {"wind_speed_mps": 0.0, "wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
 )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from harness.metrics import MEANING
 from harness.verdict.assess import Assess
 from harness.verdict.attribution import Attribution, attributions, rung
-from harness.verdict.pairs import FAILED, Pairs, axes, change, entered, plant_pairs, spread, varying
+from harness.verdict.pairs import FAILED, Pairs, axes, change, entered, ordered, plant_pairs, spread, varying
 from harness.verdict.parts import with_quantities
 from harness.verdict.scorecard import Scorecard, scorecards
 from harness.verdict.statistics import Effect, effect
@@ -113,5 +113,11 @@ def _mean(values: Sequence[float] | np.ndarray) -> float:
 
 
 def axes_of(comparison: Comparison) -> dict[str, list[object]]:
-    """What was set to several values, over all airframes."""
-    return axes(spread(comparison.pairs.other), without=("plant",))
+    """What was set to several values on any airframe, and the airframes."""
+    flights = spread(comparison.pairs.other)
+    found = {"aircraft": ordered(flights["aircraft"])}
+    found = found if len(found["aircraft"]) > 1 else {}
+    for _, of in flights.groupby("aircraft"):
+        for axis in axes(of):
+            found.setdefault(axis, ordered(flights[axis]))
+    return found

@@ -29,6 +29,9 @@ OF_A_CIRCLE = frozenset(  # metrics that mean something only where the law circl
         "command_activity_deg_s2",
     }
 )
+REFERENCE: Mapping[str, object] = MappingProxyType(  # what is undisturbed, by the columns of `spread`
+    {"wind_speed_mps": 0.0, "wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
+)
 IDEAL: Mapping[str, float] = MappingProxyType({"heading_rate_gain": 1.0, "turn_ratio": 1.0})  # of the rest, zero
 BOUNDED: Mapping[str, float] = MappingProxyType({"saturation_fraction": 1.0})  # the worst that can be
 

@@ -89,6 +89,7 @@ def _rendered(name: str, comparison: Comparison, origin: Origin) -> str:
         origin=origin,
         answer=words.answer(comparison),
         heading=list(words.heading(comparison)),
+        summary=[line.rstrip(":") for line in words.heading(comparison) if not line.startswith(" ")],
         axes={axis: [shown(value) for value in values] for axis, values in axes_of(comparison).items()},
         margins=written(comparison.assess),
         words=words,
@@ -137,7 +138,8 @@ def _attributed(attribution: Attribution) -> list[Figure]:
         found.append(
             Figure(
                 figures.draw(partial(figures.waterfall, attribution=attribution), height=4.6),
-                f"What each rung adds, in the mean over the {attribution.scenarios} scenarios flown on all of them; a "
+                f"What each rung adds, in the mean over the {attribution.scenarios} scenarios flown on all of them in "
+                f"which the law circles on {attribution.rungs[0]}; a "
                 "dark line is the 95 % interval of that step.",
             )
         )

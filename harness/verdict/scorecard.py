@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.verdict.assess import Assess
-from harness.verdict.pairs import Pairs, axes, is_ordered, joined, spread
+from harness.verdict.pairs import REFERENCE, Pairs, axes, is_ordered, joined, spread
 from harness.verdict.parts import PARTS, Part
 from harness.verdict.statistics import Effect, Share, effect, equivalence, holm, mcnemar, share
 
@@ -200,21 +200,23 @@ def _judged(found: Sequence[Finding], across: Mapping[str, Sequence[object]], as
 def conclusion(cells: Sequence[Cell], across: Mapping[str, Sequence[object]]) -> tuple[str, str]:
     """The verdict, and under what condition.
 
-    *Holds if*: of all axes the interval (of words: the set) that covers most cells, all of which pass. *Not shown*: no
-    cell's difference is out of bounds and no flight is lost too many, the draws are too few or scatter too much.
+    *Holds if*: of all axes the interval (of words: the set) that covers most cells, all of which pass; and at what
+    other settings alone those were flown, where the rest was flown at more. *Not shown*: no cell's difference is out of
+    bounds and no flight is lost too many, the draws are too few or scatter too much.
     """
     if not cells:
         return UNMEASURED, ""
     if all(cell.passes for cell in cells):
         return HOLDS, ""
-    best, condition = 0, ""
+    best: list[Cell] = []
+    condition = ""
     for axis, values in across.items():
         passing = [value for value in values if _passes(cells, axis, value)]
         measured = [value for value in values if any(cell.at[axis] == value for cell in cells)]
         for run in _runs(measured, passing) if is_ordered(values) else [passing]:
-            covered = sum(cell.at[axis] in run for cell in cells)
-            if covered > best:
-                best, condition = covered, _said(axis, run, measured)
+            covered = [cell for cell in cells if cell.at[axis] in run]
+            if len(covered) > len(best):
+                best, condition = covered, _said(axis, run, measured) + _only(covered, cells, axis)
     if best:
         return IF, condition
     return (NOT if any(cell.fails for cell in cells) else UNSHOWN), ""
@@ -247,6 +249,17 @@ def _said(axis: str, run: Sequence[object], values: Sequence[object]) -> str:
     if run[-1] == values[-1]:
         return f"{axis} >= {least}"
     return f"{axis} = {least}" if len(run) == 1 else f"{least} <= {axis} <= {most}"
+
+
+def _only(covered: Sequence[Cell], cells: Sequence[Cell], axis: str) -> str:
+    """On the other axes, the values that alone were flown there, though the rest of the cells has more."""
+    said = []
+    for other in (other for other in cells[0].at if other != axis):
+        there, all_of = ({str(cell.at[other]): cell.at[other] for cell in some} for some in (covered, cells))
+        if len(there) < len(all_of):
+            is_reference = list(there.values()) == [REFERENCE.get(other)]
+            said.append("undisturbed" if is_reference else f"{other} = {' or '.join(map(shown, there.values()))}")
+    return f", flown only at {', '.join(dict.fromkeys(said))}" if said else ""
 
 
 def shown(value: object) -> str:

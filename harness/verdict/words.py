@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from harness.commands.telling import number
-from harness.verdict.attribution import REFERENCE
 from harness.verdict.comparison import Comparison, Left, Row
+from harness.verdict.pairs import REFERENCE
 from harness.verdict.scorecard import HOLDS, IF, NOT, UNMEASURED, UNSHOWN, Cell, Finding, Scorecard, shown
 from harness.verdict.statistics import Effect, Share
 
@@ -19,7 +19,7 @@ def answer(comparison: Comparison) -> list[str]:
     whole = "As a whole" if all(map(_holds_all, cards)) else "Not as a whole"
     return [
         f"Does it hold? {whole} ({beside}): {'; '.join(map(_holds, cards))}.",
-        f"What breaks first? {_sentence(map(_first, cards))}.",
+        f"What breaks first? {_sentence(_first(cards))}.",
         f"What does it cost? {_sentence(map(_costs, cards))}.",
     ]
 
@@ -50,17 +50,25 @@ def breaks_first(card: Scorecard) -> Finding | None:
     return max(broken, key=lambda f: (f.failed / len(f.cells), f.worst.use if f.worst else 0.0), default=None)
 
 
-def _first(card: Scorecard) -> str:
-    finding = breaks_first(card)
-    if finding is None or finding.worst is None:
-        return f"on {card.aircraft} nothing that was measured"
-    where = f" (it holds if {finding.condition})" if finding.condition else ""
-    worst = finding.worst
-    return (
-        f"on {card.aircraft} {finding.part.title}: it fails in {finding.failed} of {len(finding.cells)} cells{where}, "
-        f"at worst with {measured(worst.mean, finding)} where {bound(worst)} is asked"
-        f"{' at ' if worst.at else ''}{place(worst)}"
-    )
+def _first(cards: Sequence[Scorecard]) -> Iterator[str]:
+    """A clause for each part that breaks first somewhere, with all airframes on which it does."""
+    broken = [(card.aircraft, finding) for card in cards if (finding := breaks_first(card))]
+    for part in dict.fromkeys(finding.part for _, finding in broken):
+        of_it = [(aircraft, finding) for aircraft, finding in broken if finding.part is part]
+        each = [f"on {aircraft} {_broken(finding)}" for aircraft, finding in of_it]
+        aircraft, worst = max(((a, f.worst) for a, f in of_it if f.worst), key=lambda found: found[1].use)
+        where = place(worst)
+        furthest = f", furthest out on {aircraft} at {where}" if where else ""
+        yield f"{part.title} fails {', '.join(each)}, where {bound(worst)} is asked{furthest}"
+    whole = [card.aircraft for card in cards if not breaks_first(card)]
+    if whole:
+        yield f"on {_and(whole)} nothing that was measured"
+
+
+def _broken(finding: Finding) -> str:
+    worst = measured(finding.worst.mean, finding) if finding.worst else ""
+    unless = f", not if {finding.condition}" if finding.condition else ""
+    return f"in {finding.failed} of {len(finding.cells)} cells (at worst {worst}{unless})"
 
 
 def place(cell: Cell) -> str:
@@ -122,7 +130,8 @@ def short(effect: Effect) -> str:
 
 def of(share: Share) -> str:
     """A share with its interval."""
-    return f"{share.number} of {share.of} ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
+    low, high = (f"{100 * bound:.2g}" if bound < 0.095 else f"{100 * bound:.0f}" for bound in (share.low, share.high))
+    return f"{share.number} of {share.of} ({low} to {high} %)"
 
 
 def bound(cell: Cell) -> str:
@@ -187,7 +196,8 @@ def _left(what: str, left: Sequence[Left]) -> Iterator[str]:
         return
     yield f"{len(left)} flights {what}:"
     for flight in left[:MOST_LISTED]:
-        settings = ", ".join(f"{key} = {shown(value)}" for key, value in flight.settings.items())
+        there = {key: value for key, value in flight.settings.items() if value == value}  # no NaN: not of its law
+        settings = ", ".join(f"{key} = {shown(value)}" for key, value in there.items())
         yield f"  {flight.key[:12]} {flight.outcome}: {settings}"
     if len(left) > MOST_LISTED:
         yield f"  and {len(left) - MOST_LISTED} more (all in --json)"
