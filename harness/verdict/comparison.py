@@ -17,7 +17,7 @@ from harness.verdict.statistics import Effect, effect
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A metric of one airframe under one law: the baseline's mean, the plant's, their paired difference."""
+    """A metric of one airframe under one law: the means of the pairs that say something of it, their difference."""
 
     aircraft: str
     law: str
@@ -103,8 +103,11 @@ def _rows(paired: Pairs) -> Iterator[Row]:
             reference, other = those.reference[metric].to_numpy(float), those.other[metric].to_numpy(float)
             if np.isnan(other).all():
                 continue
-            found = effect(change(those, metric), those.other["seed"].to_numpy(), metric)
-            yield Row(str(aircraft), str(label), str(plant), metric, _mean(reference), _mean(other), found)
+            values = change(those, metric)
+            counts = ~np.isnan(values) | np.isnan(reference)  # what the baseline has not is told of the plant alone
+            found = effect(values, those.other["seed"].to_numpy(), metric)
+            means = _mean(reference[counts]), _mean(other[counts])
+            yield Row(str(aircraft), str(label), str(plant), metric, *means, found)
 
 
 def _mean(values: Sequence[float] | np.ndarray) -> float:
