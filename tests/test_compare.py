@@ -163,6 +163,15 @@ def test_one_flight_has_nothing_to_be_compared_with(tmp_path: Path) -> None:
     assert done.stderr.endswith("a comparison takes at least two, of kinematic and another plant\n")
 
 
+def test_a_flight_without_a_partner_is_listed(tmp_path: Path) -> None:
+    text = EXPERIMENT.replace("40.0", "10.0", 1)
+    out = run(tmp_path, text, "--limit", 3)
+    told = harness("compare", out).stdout.splitlines()
+    (alone,) = compared(out)["unpaired"]
+    (at,) = (i for i, line in enumerate(told) if line.startswith("1 flight") and "no partner:" in line)
+    assert told[at + 1].startswith(f"  {alone['key'][:12]} completed: plant = kinematic, ")
+
+
 def test_still_air_and_a_fixed_start_give_one_difference_and_no_interval(tmp_path: Path) -> None:
     text = EXPERIMENT.replace('"start.heading_deg" = { uniform = [20.0, 60.0] }\n', "").replace("40.0", "10.0", 1)
     out = run(tmp_path, text)

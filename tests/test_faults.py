@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 import harness
+from harness.runs.estimate import guess
 from harness.runs.matrix import read_matrix
 from harness.runs.run import Options, Progress, run
 from harness.runs.store import JOURNAL, StoreError, begun, reading
@@ -194,6 +195,17 @@ def test_a_flight_that_hangs_is_ended_and_costs_no_other(tmp_path: Path) -> None
     results = harness.load_results(tmp_path / "out")
     assert results["outcome"].tolist() == ["timeout" if i in (2, 5) else "completed" for i in range(12)]
     assert results["reason"][2] == "ended after 1 s"
+
+
+def test_a_flight_may_take_twenty_times_its_estimate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.runs.workers.SHORTEST_TIMEOUT", 0.0)
+    file = settings(tmp_path, count=3, duration=2000.0)
+    matrix = read_matrix(read_settings(file))
+    (limit,) = {20.0 * guess(matrix.flight(combination)) for combination in matrix.combinations()}
+    flown(file, tmp_path / "out", fly=hang, workers=1)
+    results = harness.load_results(tmp_path / "out")
+    assert results["outcome"].tolist() == ["completed", "completed", "timeout"]
+    assert 0.2 * limit < float(results["reason"][2].split()[2]) < 10.0 * limit  # it learns from the others
 
 
 def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: Path) -> None:

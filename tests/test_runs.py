@@ -1,5 +1,6 @@
 """Runs as a user meets them: real workers, a real store, killed and resumed."""
 
+import contextlib
 import itertools
 import json
 import math
@@ -69,6 +70,10 @@ def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: P
     done = command("run", file, "--out", out, "--workers", 2)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("A title\nA question?\n10 flights\n")
+    assert done.stderr.splitlines()[-1].startswith("10 of 10 flights done, 0 failed, ")
+    kinematic, sixdof = (line.split() for line in done.stdout.splitlines() if " of 5 " in line)
+    assert kinematic[:4] == ["kinematic", "0", "of", "5"]
+    assert kinematic[-1] == "-" != sixdof[-1]  # the median sideslip
     assert "10 flown, 0 earlier, 0 failed" in done.stdout
     assert sorted(path.name for path in out.iterdir()) == ["flights", PARQUET, JOURNAL, "lock"]
     results = harness.load_results(out)
@@ -80,6 +85,22 @@ def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: P
     assert "0 flown, 10 earlier, 0 failed" in again.stdout
     assert (out / PARQUET).stat().st_mtime_ns == exported  # there was nothing to add
     pd.testing.assert_frame_equal(harness.load_results(out), results)
+
+
+def test_progress_moves_on_a_terminal(file: Path, tmp_path: Path) -> None:
+    terminal, its_end = os.openpty()
+    words = [sys.executable, "-m", "harness", "run", file, "--out", tmp_path / "out", "--workers", 0, "--log", "none"]
+    with subprocess.Popen(list(map(str, words)), stdout=subprocess.DEVNULL, stderr=its_end) as run_:
+        os.close(its_end)
+        shown = ""
+        with contextlib.suppress(OSError):  # the terminal's, when the last one that writes to it has ended
+            while part := os.read(terminal, 10_000):
+                shown += part.decode(errors="replace")
+    os.close(terminal)
+    assert run_.returncode == 0, shown
+    assert "10 of 10 flights done, 0 failed" in shown
+    assert "flights/s" in shown
+    assert "\x1b[2K" in shown  # a line is replaced by the next
 
 
 def test_results_are_one_row_per_flight_with_every_setting_and_metric(file: Path, tmp_path: Path) -> None:
@@ -246,6 +267,7 @@ def test_the_store_knows_where_its_rows_come_from(file: Path, tmp_path: Path) ->
     root = Path(harness.__file__).parent.parent
     head = subprocess.run(["git", "-C", str(root), "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
     assert run_["git_commit"] == (head.stdout.strip() or None)
+    assert (run_["git_dirty"] is None) == (run_["git_commit"] is None)
 
 
 @pytest.mark.parametrize(("log", "expected"), [("all", 30), ("none", 0), ("failed", 3), ("sample", 10)])
