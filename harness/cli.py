@@ -59,6 +59,11 @@ def main() -> None:
     except click.ClickException as error:
         _tell(error)
         code = error.exit_code
+    except OSError as error:
+        if error.filename is None:
+            raise  # a fault of the harness, not of a file
+        click.echo(f"{error.filename}: {error.strerror}", err=True)
+        code = 2
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)
         code = 130

@@ -264,6 +264,15 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Pa
     assert "Traceback" not in done.stderr
     kept = runs_of(small_disk / "out")
     assert 0 < len(kept) < 900
+    table, rest = small_disk / "table.csv", small_disk / "rest"
+    with pytest.raises(OSError, match="No space left"):
+        rest.write_bytes(bytes(2_000_000))
+    exported = [sys.executable, "-m", "harness", "export", f"{small_disk / 'out'}:{next(iter(kept))}", "--to", "csv"]
+    done = subprocess.run([*exported, "--out", str(table)], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == f"{table}: No space left on device"
+    assert {path.name for path in small_disk.iterdir()} == {"out", "rest"}
+    rest.unlink()
     remount(small_disk, "size=50m")
     again = command(file, small_disk / "out")
     assert again.returncode == 0, again.stderr

@@ -28,23 +28,16 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
       harness export out/wind:3f2a --to csv
       harness export flight.rrd --to parquet --out flight.parquet
     """
-    import os
-
-    from harness.commands.telling import BadInput, writable
+    from harness.commands.telling import writable
+    from harness.whole import whole
 
     table, name = _table(what, flight)
     path = writable(out or Path(f"{name}.{kind}"))
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with whole(path) as partial:
         if kind == "csv":
             table.to_csv(partial, index=False)
         else:
             table.to_parquet(partial, index=False)
-        partial.replace(path)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
     click.echo(f"{path}: {len(table)} rows, {len(table.columns)} columns")
 
 

@@ -79,10 +79,7 @@ def fly(
     if rrd is not None:
         from harness.review.recording import write_recording
 
-        try:
-            write_recording(rrd, {flight.plant: log}, Path(what).stem, command=typed())
-        except OSError as error:
-            raise BadInput(f"{rrd}: cannot be written: {error.strerror or error}") from None
+        write_recording(rrd, {flight.plant: log}, Path(what).stem, command=typed())
     if as_json:
         click.echo(json.dumps(result, allow_nan=False))
     else:

@@ -33,6 +33,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     from harness.identification.telling import told
     from harness.plant import End, PlantError
     from harness.plants.identified import IdentifiedError, document, read
+    from harness.whole import whole
 
     try:
         airframe = airframe_of(aircraft)
@@ -60,13 +61,8 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
             raise BadInput(f"--airspeed: at {speed:g} m/s a manoeuvre ended early, {end.outcome}: {end}") from None
     for line in told(found):
         click.echo(line)
-    _write(file, document(airframe, [*others, found.identified]))
-    for path, plot in plots.items():
-        _write(path, plot(found))
+    drawn = {path: plot(found) for path, plot in plots.items()}
+    for path, text in {file: document(airframe, [*others, found.identified]), **drawn}.items():
+        with whole(path) as partial:
+            partial.write_text(text, encoding="utf-8")
     click.echo(f"kept in {file}; drawn in {', '.join(map(str, plots))}")
-
-
-def _write(path: Path, text: str) -> None:
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)

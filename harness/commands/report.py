@@ -22,6 +22,7 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
     from harness.commands.comparing import read_comparison
     from harness.commands.telling import BadInput, busy, writable
     from harness.verdict import report as job
+    from harness.whole import whole
 
     if out is not None and markdown is not None:
         raise BadInput("--out and --markdown are one file each: give one of them")
@@ -31,7 +32,6 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
     with busy("comparing and drawing"):
         comparison, origin = read_comparison(directory, baseline, overrides)
         text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
-        partial = path.with_name(f".{path.name}.partial")
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
+        with whole(path) as partial:
+            partial.write_text(text, encoding="utf-8")
     click.echo(f"{path}")

@@ -55,10 +55,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
 
     title = f"{Path(what).name}: {' | '.join(logs)}"
     if save is not None:
-        try:
-            write_recording(save, logs, title, command=typed())
-        except OSError as error:
-            raise BadInput(f"{save}: cannot be written: {error.strerror or error}") from None
+        write_recording(save, logs, title, command=typed())
         click.echo(f"{save}: {', '.join(logs)}. To open it: harness view {save}")
         return None
     with tempfile.TemporaryDirectory(prefix="standoff-harness-") as folder:

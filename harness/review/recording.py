@@ -1,6 +1,5 @@
 """A recording of flights: everything logged to a Rerun stream, and written to a file whole or not at all."""
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
 from harness.review.shown import Shown, shown
 from harness.review.target_plots import target_plots
+from harness.whole import whole
 
 Logs = Mapping[str, FlightLog]
 
@@ -32,12 +32,8 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command
         content = _encoded(logs, title, notes, command)
     finally:
         clean_up()
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with whole(path) as partial:
         partial.write_bytes(content)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def content_of(flights: Sequence[Shown], lanes: int) -> Content:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import sqlite3
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.metrics import MEANING
 from harness.runs.store import reading
+from harness.whole import whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,12 +48,8 @@ def export(folder: Path) -> None:
         if _is_current(path, stand):
             return
         table = _table(journal).replace_schema_metadata({_STAND: stand})
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with whole(path) as partial:
         pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _stand(journal: sqlite3.Connection) -> bytes:
