@@ -17,8 +17,8 @@ from harness.commands.report import report
 from harness.commands.reproduce import reproduce
 from harness.commands.run import run
 from harness.commands.show import show
+from harness.commands.stdout import guard
 from harness.commands.view import view
-from harness.stdout import guard
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

@@ -6,10 +6,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from harness.commands.telling import number
+from harness.cells import METRICS, number
 from harness.flight import Flight, feasibility_margin, needed_rate
 from harness.flight_log import FlightLog
-from harness.metrics import TABLE, metrics
+from harness.metrics import metrics
 from harness.settings import flight_from_document
 from harness.simulation import simulate
 
@@ -83,9 +83,9 @@ def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
 def table(flown: list[Flown]) -> list[str]:
     """One case side by side, a line per flight: settling to 1 m; error, saturation and activity over the last half."""
     label = 8 + max(len(f.plant) for f in flown)
-    lines = ["".join([" " * label, *(f"{TABLE[m][row]:>10}" for m in TABLE)]) for row in (0, 1)]
+    lines = ["".join([" " * label, *(f"{METRICS[m][row]:>10}" for m in METRICS)]) for row in (0, 1)]
     for one in flown:
-        cells = (number(_scaled(one.metrics[m], TABLE[m][2])) for m in TABLE)
+        cells = (number(one.metrics[m], METRICS[m][2]) for m in METRICS)
         lines.append("".join([f"{one.law:8}{one.plant:{label - 8}}", *(f"{cell:>10}" for cell in cells)]))
     return lines
 
@@ -137,8 +137,4 @@ def _beside(flown: list[Flown], metric: str, sentence: str, told: str, differenc
 
 
 def _each(flown: list[Flown], metric: str, scale: float = 1.0) -> str:
-    return " / ".join(number(_scaled(one.metrics[metric], scale)) for one in flown)
-
-
-def _scaled(value: float | None, scale: float) -> float | None:
-    return None if value is None else value * scale
+    return " / ".join(number(one.metrics[metric], scale) for one in flown)

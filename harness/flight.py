@@ -245,6 +245,17 @@ def feasibility_margin(flight: Flight) -> float:
     return flight.law.max_heading_rate - needed_rate(flight)
 
 
+def feasibility_line(flight: Flight) -> str:
+    """Whether the circle can be held, and by what margin."""
+    margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
+    of = " of course" if flight.law.command == "course_rate" else ""
+    verdict = "feasible" if margin >= 0 else "INFEASIBLE"
+    return (
+        f"circle {verdict}: holding it takes up to {needed:.2f} deg/s{of}, "
+        f"the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s (margin {margin:+.2f})"
+    )
+
+
 def warnings(flight: Flight) -> list[str]:
     """What the user should know before trusting the flight; it is flown all the same."""
     said = []

@@ -31,18 +31,6 @@ MEANING: Mapping[str, str] = MappingProxyType(
         "altitude_deviation_peak_m": "largest, from the commanded altitude",
     }
 )
-TABLE: Mapping[str, tuple[str, str, float]] = MappingProxyType(
-    {  # of a table of flights: heading, unit there, how many of them make the metric's own unit
-        "convergence_time_s": ("settles", "s", 1.0),
-        "range_error_rms_m": ("error", "m rms", 1.0),
-        "range_error_peak_m": ("error", "m peak", 1.0),
-        "overshoot_m": ("overshoot", "m", 1.0),
-        "saturation_fraction": ("saturated", "%", 100.0),
-        "command_activity_deg_s2": ("activity", "deg/s2", 1.0),
-        "bank_peak_deg": ("bank", "deg peak", 1.0),
-        "sideslip_peak_deg": ("sideslip", "deg peak", 1.0),
-    }
-)
 
 SETTLED_FOR = 5.0  # s
 AVERAGED_OVER = 0.25  # s

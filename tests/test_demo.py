@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from harness import demo
-from harness.commands.telling import number
+from harness.cells import number
 from harness.flight_log import COLUMNS
 from harness.plant import Outcome
 from harness.review.reading import read_recording

@@ -16,8 +16,8 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
       harness check experiments/stationary.toml
     """
     from harness.commands.run_telling import surveyed, tell_survey
-    from harness.commands.telling import BadInput, feasibility_line, flight_of, read_file
-    from harness.flight import warnings
+    from harness.commands.telling import BadInput, flight_of, read_file
+    from harness.flight import feasibility_line, warnings
     from harness.runs.matrix import read_matrix
     from harness.settings import SettingsError
 

@@ -44,8 +44,9 @@ def fly(
     """
     import json
 
-    from harness.commands.telling import BadInput, feasibility_line, flight_of, number, read_file, typed, writable
-    from harness.flight import warnings
+    from harness.cells import number
+    from harness.commands.telling import BadInput, flight_of, read_file, typed, writable
+    from harness.flight import feasibility_line, warnings
     from harness.key import identity
     from harness.metrics import MEANING
     from harness.runs.recall import place_of

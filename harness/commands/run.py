@@ -63,7 +63,7 @@ def run(
     workers = (os.cpu_count() or 1) if workers is None else workers
     try:
         matrix = read_matrix(read_settings(file, overrides))
-        done = frozenset(positions_done(matrix, out, retry_failed=retry is not None) if out else ())
+        done = positions_done(matrix, out, retry_failed=retry is not None) if out else frozenset[int]()
         found = surveyed(matrix, limit, done)
         if dry_run or out is None:
             tell_survey(matrix, found, len(done))

@@ -61,6 +61,9 @@ def tell_time(found: Survey, done: int, workers: int, log: str | None) -> None:
     from harness.runs.survey import disk
 
     flights = found.flights - done
+    if not flights:
+        click.echo("nothing is left to fly")
+        return
     recorded = {"all": flights, "none": 0, "failed": 0}.get(log or "", min(RECORDED, flights))
     seconds, size = found.seconds / workers, disk(found, recorded)
     click.echo(f"about {_duration(seconds)} with {workers} worker{'s' if workers > 1 else ''}, {_size(size)} of disk")
@@ -115,8 +118,7 @@ def tell_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from harness.commands.telling import number
-    from harness.metrics import TABLE
+    from harness.cells import METRICS, number
     from harness.plant import Outcome
     from harness.runs.summary import summary
 
@@ -126,15 +128,13 @@ def tell_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     for keys in results.axes:
         table.add_column(", ".join(key.rpartition(".")[2] for key in keys.split(", ")), no_wrap=True)
     table.add_column("settled", justify="right", no_wrap=True)
-    for heading, unit, _ in TABLE.values():
+    for heading, unit, _ in METRICS.values():
         table.add_column(f"{heading}\n{unit}", justify="right", no_wrap=True)
     if ended:
         table.add_column("ended", no_wrap=True)
     for line in results.lines:
         cells = [*line.labels, f"{line.settled} of {line.flights}"]
-        for name, (_, _, scale) in TABLE.items():
-            value = line.medians[name]
-            cells.append(number(None if value is None else scale * value))
+        cells += [number(line.medians[name], scale) for name, (_, _, scale) in METRICS.items()]
         if ended:
             cells.append(", ".join(f"{count} {outcome}" for outcome, count in line.outcomes.items()))
         table.add_row(*cells)

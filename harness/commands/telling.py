@@ -1,8 +1,7 @@
-"""What several commands say alike: bad input, feasibility, numbers."""
+"""What several commands do alike: bad input told, files read and places tried."""
 
 from __future__ import annotations
 
-import math
 import os
 import shlex
 import sys
@@ -57,26 +56,6 @@ def flight_of(file: SettingsFile) -> Flight:
 def typed() -> str:
     """The command as it was typed."""
     return shlex.join(["harness", *sys.argv[1:]])
-
-
-def feasibility_line(flight: Flight) -> str:
-    """Whether the circle can be held, and by what margin."""
-    from harness.flight import feasibility_margin, needed_rate
-
-    margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
-    of = " of course" if flight.law.command == "course_rate" else ""
-    verdict = "feasible" if margin >= 0 else "INFEASIBLE"
-    return (
-        f"circle {verdict}: holding it takes up to {needed:.2f} deg/s{of}, "
-        f"the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s (margin {margin:+.2f})"
-    )
-
-
-def number(value: float | None) -> str:
-    """Three significant digits, or a dash for none."""
-    if value is None:
-        return "-"
-    return f"{value:.3g}" if abs(value) >= 0.0005 else "0"
 
 
 def busy(what: str) -> AbstractContextManager[object]:

@@ -5,8 +5,8 @@ import platform
 from collections.abc import Sequence
 from functools import cache
 
-from harness.commands.telling import feasibility_line, number
-from harness.flight import warnings
+from harness.cells import number
+from harness.flight import feasibility_line, warnings
 from harness.flight_log import FlightLog
 from harness.key import PHYSICS, flight_key
 from harness.metrics import MEANING, metrics

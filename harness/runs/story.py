@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.commands.telling import number
+from harness.cells import number
 from harness.metrics import MEANING
 from harness.runs.recordings import recording_path
 from harness.runs.results import flat_settings

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from harness.metrics import TABLE
+from harness.cells import METRICS
 from harness.runs.matrix import Matrix
 from harness.runs.results import flat_settings
 from harness.runs.store import reading
@@ -60,7 +60,7 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
 class _Group:
     def __init__(self) -> None:
         self._outcomes: dict[str, int] = {}
-        self._values: dict[str, list[float]] = {name: [] for name in TABLE}
+        self._values: dict[str, list[float]] = {name: [] for name in METRICS}
 
     def add(self, outcome: str, metrics: Mapping[str, float | None]) -> None:
         self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1

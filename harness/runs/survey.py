@@ -45,11 +45,8 @@ def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = froz
 
     Raises `SettingsError` at the end with the mistakes that it found.
     """
-    found, seen, starts = (
-        Survey(varies={key: count for key, count in matrix.varies.items() if count > 1}),
-        _Seen(),
-        set[object](),
-    )
+    found = Survey(varies={key: count for key, count in matrix.varies.items() if count > 1})
+    seen, starts = _Seen(), set[object]()
     for position in range(matrix.positions):
         if limit is not None and found.flights >= limit:
             break
