@@ -21,7 +21,8 @@ from harness.metrics import MEANING
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, mixed_versions
 from harness.runs.run import Options, Progress, run
-from harness.runs.store import JOURNAL, reading
+from harness.runs.store import JOURNAL, find, reading
+from harness.runs.story import story
 from harness.settings import read_settings
 
 MATRIX = """\
@@ -137,6 +138,13 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
     listed = command("show", out).stdout.splitlines()
     assert len(listed) == 1 + 10
     assert [row["key"][:8], "sixdof", "0"] == listed[2].split()[:3]
+
+
+def test_a_story_tells_the_air_that_the_flight_met(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flown(file, out, "seed=0", "plant=kinematic", "wind.turbulence=light", "wind.steady_mps=[3.0, 0.0]")
+    told = list(story(out, find(out, harness.load_results(out)["key"][0])))
+    assert any("in wind of 3 m/s north, 0 m/s east and light turbulence, seed 0" in line for line in told)
 
 
 @pytest.mark.parametrize("key", ["", "zz", "f" * 40])

@@ -1,8 +1,9 @@
 """A row of a run told in words."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from harness.cells import number
 from harness.metrics import MEANING
@@ -25,14 +26,14 @@ _ENDED = {
 def story(folder: Path, stored: Stored) -> Iterator[str]:
     """Settings, metrics, end and origin, in lines."""
     row, run, settings = stored.row, stored.run, stored.row["flight"]
-    law, wind = settings["law"], settings["wind"]["steady_mps"]
+    law = settings["law"]
     yield f"flight {row['key']}"
     if run["title"]:
         yield f"of {run['title']!r}: {run['question']}"
     what = settings["plant"] if settings["plant"] == "kinematic" else f"{settings['plant']} {settings['aircraft']}"
-    air = f"in wind of {wind[0]:g} m/s north, {wind[1]:g} m/s east" if any(wind) else "in still air"
     yield (
-        f"{law['name']} ({law['gains']}) on {what}, {settings['duration_s']:g} s {air}, seed {settings['seed']}, "
+        f"{law['name']} ({law['gains']}) on {what}, {settings['duration_s']:g} s in {_air(settings['wind'])}, "
+        f"seed {settings['seed']}, "
         f"to circle at {law['standoff_m']:g} m with {law['max_heading_rate_deg_s']} deg/s at most"
     )
     margin = row["feasibility_margin_deg_s"]
@@ -71,3 +72,13 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
         if path.is_file()
         else f"to record it: harness fly {folder}:{row['key'][:8]} --rrd flight.rrd"
     )
+
+
+def _air(wind: Mapping[str, Any]) -> str:
+    """What the flight meets, in words."""
+    north, east = wind["steady_mps"]
+    met = [f"wind of {north:g} m/s north, {east:g} m/s east"] if north or east else []
+    met += ["shear"] if any(wind["shear_mps_per_m"]) else []
+    met += ["gusts"] if wind["gusts"] else []
+    met += [f"{wind['turbulence']} turbulence"] if wind["turbulence"] != "none" else []
+    return " and ".join(met) or "still air"
