@@ -88,6 +88,13 @@ def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: P
     pd.testing.assert_frame_equal(harness.load_results(out), results)
 
 
+def test_a_file_in_the_place_of_the_directory_is_told_and_left(file: Path) -> None:
+    done = command("run", file, "--out", file)
+    assert done.returncode == 2
+    assert done.stderr == f"{file}: is a file, not a folder\n"
+    assert file.read_text(encoding="utf-8") == MATRIX
+
+
 def test_progress_moves_on_a_terminal(file: Path, tmp_path: Path) -> None:
     terminal, its_end = os.openpty()
     words = [sys.executable, "-m", "harness", "run", file, "--out", tmp_path / "out", "--workers", 0, "--log", "none"]

@@ -65,6 +65,8 @@ class Store:
     def __init__(self, folder: Path) -> None:
         """Makes the directory where there is none. Raises `StoreError`."""
         self.folder = folder
+        if folder.exists() and not folder.is_dir():
+            raise StoreError(f"{folder}: is a file, not a folder")
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = _locked(folder / LOCK)
