@@ -119,7 +119,7 @@ def flat_settings(settings: Mapping[str, Any], within: str = "") -> dict[str, An
     """Every setting by its dotted key. A list of tables is JSON text; infinity, a text in JSON, is a number again."""
     flat: dict[str, Any] = {}
     for key, value in settings.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, dict):
             flat.update(flat_settings(value, f"{within}{key}."))
         elif key in _LISTS_OF_TABLES:
             flat[within + key] = json.dumps(value)
