@@ -44,9 +44,13 @@ def told(found: Identification) -> Iterator[str]:
     yield f"  {'':52}lagged  coordinated"
     for name, (lagged, coordinated) in known.errors.items():
         yield f"  {name:52}{100 * lagged:6.1f}{100 * coordinated:13.1f}"
-    beyond = [name for name, (lagged, _) in known.errors.items() if lagged > BOUND]
-    if beyond:
-        yield f"lagged is farther than {100 * BOUND:g} % from the flown in: {'; '.join(beyond)}"
+    for i, plant in enumerate(("lagged", "coordinated")):
+        beyond = [name for name, errors in known.errors.items() if errors[i] > BOUND]
+        if beyond:
+            yield (
+                f"{plant} is farther than {100 * BOUND:g} % from the flown in {len(beyond)} of {len(known.errors)}: "
+                f"{'; '.join(beyond)}"
+            )
 
 
 def _response(r: Response) -> str:
