@@ -168,7 +168,7 @@ def test_a_flight_without_a_partner_is_listed(tmp_path: Path) -> None:
     out = run(tmp_path, text, "--limit", 3)
     told = harness("compare", out).stdout.splitlines()
     (alone,) = compared(out)["unpaired"]
-    (at,) = (i for i, line in enumerate(told) if line.startswith("1 flight") and "no partner:" in line)
+    (at,) = (i for i, line in enumerate(told) if line == "1 flight without a partner:")
     assert told[at + 1].startswith(f"  {alone['key'][:12]} completed: plant = kinematic, ")
 
 

@@ -87,8 +87,8 @@ def test_a_flight_without_partner_and_a_failed_one_are_listed_with_what_they_are
     (failed,) = found.failed
     assert (failed.outcome, failed.settings["seed"]) == ("worker_died", 5)
     text = "\n".join(lines(found))
-    assert "2 flights have no partner:" in text
-    assert "1 flights failed and are in no pair:" in text
+    assert "2 flights without a partner:" in text
+    assert "1 flight in no pair, since failed:" in text
 
 
 @pytest.mark.parametrize(

@@ -98,6 +98,10 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' if number != 1 else ''}"
+
+
 def _and(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else "".join(words)
 
@@ -172,8 +176,8 @@ def heading(comparison: Comparison) -> Iterator[str]:
     """What was compared, and what could not be."""
     seeds = comparison.pairs.other["seed"].nunique()
     yield (
-        f"{len(comparison.pairs)} pairs of {', '.join(comparison.plants)} beside {comparison.baseline}, {seeds} "
-        f"seed{'s' if seeds != 1 else ''}, from {comparison.flights} flights"
+        f"{_counted(len(comparison.pairs), 'pair')} of {', '.join(comparison.plants)} beside {comparison.baseline}, "
+        f"{_counted(seeds, 'seed')}, from {_counted(comparison.flights, 'flight')}"
     )
     infeasible = int((comparison.pairs.other["feasibility_margin_deg_s"] < 0.0).sum())
     if infeasible:
@@ -184,8 +188,8 @@ def heading(comparison: Comparison) -> Iterator[str]:
             f"{astray} of the pairs say nothing of the cost: the law does not circle the target on "
             f"{comparison.baseline} either"
         )
-    yield from _left("have no partner", comparison.unpaired)
-    yield from _left("failed and are in no pair", comparison.failed)
+    yield from _left("without a partner", comparison.unpaired)
+    yield from _left("in no pair, since failed", comparison.failed)
 
 
 MOST_LISTED = 10
@@ -194,7 +198,7 @@ MOST_LISTED = 10
 def _left(what: str, left: Sequence[Left]) -> Iterator[str]:
     if not left:
         return
-    yield f"{len(left)} flights {what}:"
+    yield f"{_counted(len(left), 'flight')} {what}:"
     for flight in left[:MOST_LISTED]:
         there = {key: value for key, value in flight.settings.items() if value == value}  # no NaN: not of its law
         settings = ", ".join(f"{key} = {shown(value)}" for key, value in there.items())
