@@ -300,6 +300,15 @@ def test_markdown_says_the_same_and_how_it_was_made(flown: Path, tmp_path: Path)
     assert all(len(set(counts)) == 1 for counts in widths)  # every row of a table has all its cells
 
 
+def test_the_readme_answers_with_the_sentences_of_the_results() -> None:
+    root = Path(__file__).parent.parent
+    results, readme = (root.joinpath(name).read_text(encoding="utf-8") for name in ("docs/results.md", "README.md"))
+    answer = results.split("## The answer")[1].split("##")[0].strip().split("\n\n")
+    assert len(answer) == 3
+    for sentence in answer:
+        assert sentence in readme
+
+
 def test_two_places_for_one_page_are_refused(flown: Path, tmp_path: Path) -> None:
     done = harness("report", flown, "--out", tmp_path / "a.html", "--markdown", tmp_path / "b.md")
     assert done.exit_code == 2
