@@ -32,7 +32,7 @@ paper: install  ## the paper's numbers, figures and claims under docs/, anew
 	$(BIN)/harness reproduce --out docs
 	$(BIN)/python -m harness.paper.identified docs/identified.md
 
-turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (a quarter of an hour)
+turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (five minutes on two processors)
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/moderate --log none
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/unturned --log none --set wind.rotation=false --limit 60
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90

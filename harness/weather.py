@@ -3,7 +3,6 @@
 `make turbulence` flies the runs; `python -m harness.weather RUN...` then writes both from their directories.
 """
 
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -54,6 +53,20 @@ def survival(flights: "pd.DataFrame") -> list[str]:
     return lines
 
 
+def rotation(flights: "pd.DataFrame") -> list[str]:
+    """A Markdown table: what turning air adds to the same flights, seed by seed, as means; none without such pairs."""
+    alike = [*(key for key in GROUPED_BY if key != "wind.rotation"), "seed"]
+    turning, still = (flights[flights["wind.rotation"] == on].set_index(alike)[list(SHOWN)] for on in (True, False))
+    added = (turning - still).dropna()
+    lines = ["| turning air adds | pairs | " + " | ".join(heading for heading, _ in SHOWN.values()) + " |"]
+    lines.append("|---|" + "--:|" * (1 + len(SHOWN)))
+    for (severity, airframe, airspeed), group in added.groupby(alike[:-1], sort=False):
+        cells = [f"{severity}, {airframe}, {airspeed:g} m/s", str(len(group))]
+        cells += [f"{group[metric].mean():+.3f}" for metric in SHOWN]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
 def spectra(step: float) -> Iterator[tuple[str, Array, Array, Array]]:
     """Of each component: name, frequencies in rad/s, spectrum of the specification, and Welch's of realisations."""
     model, span = _MODEL, _SPAN
@@ -98,11 +111,15 @@ def main(runs: Sequence[str]) -> None:
     """Writes table and figure."""
     import pandas as pd
 
-    table = "\n".join(survival(pd.concat([load_results(run) for run in runs])))
+    flights = pd.concat([load_results(run) for run in runs])
+    table = "\n".join([*survival(flights), "", *rotation(flights), ""])
     print(table)
     text = DOCUMENT.read_text(encoding="utf-8")
-    between = re.compile(r"(?<=<!-- survival -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
-    DOCUMENT.write_text(between.sub(lambda _: table, text), encoding="utf-8")
+    before, begin, rest = text.partition("<!-- survival -->\n")
+    _, end, after = rest.partition("<!-- end -->\n")
+    if not (begin and end):
+        raise ValueError(f"{DOCUMENT}: has no place for the table, between <!-- survival --> and <!-- end -->")
+    DOCUMENT.write_text(f"{before}{begin}{table}\n{end}{after}", encoding="utf-8")
     FIGURE.write_text(draw(paint, 9.0, 4.8), encoding="utf-8")
 
 
