@@ -64,8 +64,18 @@ def settings_of(flights: pd.DataFrame) -> list[str]:
 
 
 def varying(flights: pd.DataFrame) -> list[str]:
-    """The settings that are not the same in all flights."""
-    return [column for column in settings_of(flights) if flights[column].nunique(dropna=False) > 1]
+    """The settings that are not the same in all flights; without single gains that follow from the law and its set."""
+    columns = [column for column in settings_of(flights) if flights[column].nunique(dropna=False) > 1]
+    known = [column for column in ("law.name", "law.gains") if column in columns]
+    laws = joined(flights, known) if known else None
+    return [
+        c for c in columns if laws is None or c in known or not c.startswith("law.") or not _follows(flights[c], laws)
+    ]
+
+
+def _follows(values: pd.Series, others: Sequence[str]) -> bool:
+    """Whether equal others have equal values."""
+    return bool(_text(values).groupby(list(others)).nunique().max() == 1)
 
 
 def plant_pairs(flights: pd.DataFrame, baseline: str) -> Pairs:
@@ -178,7 +188,7 @@ def axes(table: pd.DataFrame, without: Iterable[str] = ("plant", "aircraft")) ->
     for column in columns:
         values = _text(table[column])
         drawn = seeds.nunique() > 1 and values.groupby(seeds).nunique().max() == 1
-        follows = any(values.groupby(_text(table[axis])).nunique().max() == 1 for axis in found)
+        follows = any(_follows(values, _text(table[axis]).tolist()) for axis in found)
         if not drawn and not follows:
             found.append(column)
     return {column: ordered(table[column]) for column in found}
