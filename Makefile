@@ -28,8 +28,8 @@ models: install  ## write the JSBSim models from the airframes' data
 identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name || exit 1; done
 
-paper: install  ## the paper's numbers, figures and claims under docs/, anew
-	$(BIN)/harness reproduce --out docs
+paper: install  ## the paper's numbers, figures and claims under docs/, on the airframes too (a quarter of an hour)
+	$(BIN)/harness reproduce --out docs --sixdof
 	$(BIN)/python -m harness.paper.identified docs/identified.md
 
 turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (five minutes on two processors)

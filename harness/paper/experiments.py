@@ -14,7 +14,8 @@ from autopilot.estimator import Estimator
 from autopilot.guidance import Law
 from autopilot.laws import law
 from harness.flight import Flight
-from harness.plant import Start
+from harness.flight_log import FlightLog
+from harness.plant import Outcome, Start
 from harness.simulation import simulate
 from harness.target import Segment, Target
 from harness.wind import Wind
@@ -153,6 +154,7 @@ class Trace:
 
     flight: Flight
     columns: Mapping[str, NDArray[np.float64]]
+    ended: str = ""  # how and when, where it ended before its time
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         return self.columns[column]
@@ -162,4 +164,10 @@ class Trace:
 def flown(flight: Flight) -> Trace:
     """A flight, flown; the latest are kept, since much is asked of the same."""
     log = simulate(flight)
-    return Trace(flight, {column: log[column].copy() for column in KEPT})
+    early = "" if log.outcome is Outcome.COMPLETED else ending(log)
+    return Trace(flight, {column: log[column].copy() for column in KEPT}, early)
+
+
+def ending(log: FlightLog) -> str:
+    """How and when a flight ended before its time."""
+    return f"{log.outcome} after {log['time'][-1] if len(log) else 0.0:.1f} s ({log.reason})"

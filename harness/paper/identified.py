@@ -18,6 +18,7 @@ from harness.paper.experiments import EXPERIMENTS, LAWS, Trace, flight, flown
 from harness.paper.job import workers
 from harness.paper.ledger import metres
 from harness.paper.measures import overshoot, peak, restricted, settled
+from harness.whole import whole
 
 PRINTED = (31.2, 72.9)  # s, Table 3
 COARSE, FINE = 0.01, 0.001  # s, for which a command is held: to look around, and to decide
@@ -191,9 +192,9 @@ def _off(p: Point) -> float:
 
 def main(path: Path) -> None:
     """Writes the document."""
-    partial = path.with_suffix(".partial")
-    partial.write_text(document(workers()), encoding="utf-8")
-    partial.replace(path)
+    text = document(workers())
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

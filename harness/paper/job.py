@@ -8,9 +8,10 @@ from functools import partial
 from typing import NamedTuple
 
 from harness.paper.claims import CLAIMS
+from harness.paper.columns import COLUMNS, GRID, Column
 from harness.paper.experiments import EXPERIMENTS, flight, flown
 from harness.paper.figures import LAWS_DRAWN, Sketch, sketch
-from harness.paper.ledger import COLUMNS, Finding, Findings, decided
+from harness.paper.ledger import Finding, Findings, Flown, decided
 from harness.paper.reproduce import Number, Reproduced, by_flight, in_order, reproduced
 
 Sketches = Mapping[tuple[str, str], Sketch]  # by experiment and law
@@ -27,12 +28,14 @@ class Part(NamedTuple):
 Job = Callable[[], Part]
 
 
-def jobs() -> list[Job]:
-    """What there is to compute, the longest first."""
-    sections = sorted(CLAIMS, key=lambda title: title.startswith("4"), reverse=True)
+def jobs(*, airframes: bool) -> list[Job]:
+    """What there is to compute, the longest first; with the airframes if they are asked for."""
+    flown = [title for title, claims in CLAIMS.items() if any(isinstance(claim, Flown) for claim in claims)]
+    sections = sorted(flown, key=lambda title: title.startswith("4"), reverse=True)
     return [
         *(partial(_numbers, numbers) for numbers in reversed(by_flight())),
-        *(flown_claims(title, i) for title in sections for i in range(len(COLUMNS))),
+        *(flown_claims(title, column) for title in sections for column in COLUMNS),
+        *(flown_claims(title, column) for title in sections for column in GRID if airframes),
         *(partial(_sketched, experiment, law) for experiment in EXPERIMENTS for law in LAWS_DRAWN),
         theory,
     ]
@@ -46,13 +49,13 @@ def _sketched(experiment: str, law: str) -> Part:
     return Part([], {(experiment, law): sketch(flown(flight(experiment, law)))}, {})
 
 
-def flown_claims(title: str, column: int) -> Job:
+def flown_claims(title: str, column: Column) -> Job:
     """What flights decide of a section, in a column."""
     return partial(_decided, title, column)
 
 
-def _decided(title: str, column: int) -> Part:
-    return Part([], {}, decided(CLAIMS[title], COLUMNS[column]))
+def _decided(title: str, column: Column) -> Part:
+    return Part([], {}, decided(CLAIMS[title], column))
 
 
 def theory() -> Part:
@@ -60,12 +63,12 @@ def theory() -> Part:
     return Part([], {}, decided([claim for claims in CLAIMS.values() for claim in claims], None))
 
 
-def everything(workers: int, done: Callable[[], None] = lambda: None) -> Part:
-    """All parts together, the same for any number of workers; `done` is called after each."""
+def everything(todo: list[Job], workers: int, done: Callable[[], None] = lambda: None) -> Part:
+    """The parts of these jobs together, the same for any number of workers; `done` is called after each."""
     numbers: list[Reproduced] = []
     sketches: dict[tuple[str, str], Sketch] = {}
     findings: dict[tuple[str, str], Finding] = {}
-    for part in computed(jobs(), workers):
+    for part in computed(todo, workers):
         numbers += part.numbers
         sketches.update(part.sketches)
         findings.update(part.findings)

@@ -2,12 +2,13 @@
 
 from functools import partial
 
-from harness.paper import figures
+from harness.paper import airframes, figures
 from harness.paper.claims import CLAIMS
+from harness.paper.columns import COLUMNS, CONDITIONS
 from harness.paper.experiments import EXPERIMENTS
 from harness.paper.figures import LAWS_DRAWN, Sketch
 from harness.paper.job import Part, Sketches
-from harness.paper.ledger import COLUMNS, Verdict, cells, counts
+from harness.paper.ledger import Verdict, cells, counts
 from harness.paper.reproduce import VARIANTS, VARIANTS_TOLD, shown
 from harness.template import template
 
@@ -29,6 +30,10 @@ def page(everything: Part) -> str:
         columns=COLUMNS,
         cells=partial(cells, findings=everything.findings),
         counts=counts(everything.findings),
+        airframes=airframes if airframes.have_flown(everything.findings) else None,
+        numbers_on_airframes=partial(airframes.numbers, everything.findings),
+        summary=partial(airframes.summary, findings=everything.findings),
+        conditions=CONDITIONS,
         verdicts=list(Verdict),
     )
 
