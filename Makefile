@@ -39,7 +39,7 @@ turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (fiv
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
 	$(BIN)/python -m harness.weather out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
 
-verdict: install  ## fly the full matrix (about 25 minutes on two processors), compare, and write docs/results.md
+verdict: install  ## fly the full matrix (22 minutes on two processors), compare, and write docs/results.md
 	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none
 	$(BIN)/harness report out/assumption
 	$(BIN)/harness report out/assumption --markdown docs/results.md
