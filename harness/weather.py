@@ -17,6 +17,7 @@ from harness.air import Array
 from harness.paper.figures import draw
 from harness.runs.results import load_results
 from harness.turbulence import dryden, turbulence
+from harness.whole import whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,8 +120,12 @@ def main(runs: Sequence[str]) -> None:
     _, end, after = rest.partition("<!-- end -->\n")
     if not (begin and end):
         raise ValueError(f"{DOCUMENT}: has no place for the table, between <!-- survival --> and <!-- end -->")
-    DOCUMENT.write_text(f"{before}{begin}{table}\n{end}{after}", encoding="utf-8")
-    FIGURE.write_text(draw(paint, 9.0, 4.8), encoding="utf-8")
+    for path, content in {
+        DOCUMENT: f"{before}{begin}{table}\n{end}{after}",
+        FIGURE: draw(paint, 9.0, 4.8),
+    }.items():
+        with whole(path) as partial:
+            partial.write_text(content, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from harness.simulation import command, observe
 from harness.target import Target
 from harness.template import template
 from harness.verdict.prediction import VISIBLE, LimitCycle, Loop, boundary, critical_gain, limit_cycle
+from harness.whole import whole
 
 AIRFRAMES = ("ultra_stick_25e", "skywalker_x8", "aerosonde")
 PERIOD = 0.05  # s, of the guidance
@@ -308,8 +309,12 @@ def main() -> None:
     """Flies, predicts and writes; about a minute."""
     docs = Path(__file__).parents[2] / "docs"
     borders = [border(name) for name in AIRFRAMES]
-    (docs / "images" / "limit_cycle.svg").write_text(map_figure(borders), encoding="utf-8")
-    (docs / "limit_cycle.md").write_text(document(list(rows()), borders), encoding="utf-8")
+    for name, content in {
+        "images/limit_cycle.svg": map_figure(borders),
+        "limit_cycle.md": document(list(rows()), borders),
+    }.items():
+        with whole(docs / name) as partial:
+            partial.write_text(content, encoding="utf-8")
 
 
 if __name__ == "__main__":
