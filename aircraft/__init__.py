@@ -35,6 +35,14 @@ def folder(name: str) -> Path:
     raise FileNotFoundError(f"no airframe {name!r}: needs airframe.toml and a JSBSim model named as its folder")
 
 
+def is_folder(name: str | Path) -> bool:
+    """Whether it is one; what cannot be a path at all (too long, a null in it) is none."""
+    try:
+        return Path(name).is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def model(airframe: Path) -> Path:
     """The JSBSim model in an airframe's folder."""
     return airframe / f"{airframe.name}.xml"

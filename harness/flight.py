@@ -1,7 +1,6 @@
 """A flight as a value: everything that decides it, and what is wrong or remarkable about that."""
 
 import math
-import os
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -155,7 +154,7 @@ def airframe_of(name: str) -> Path:
     try:
         airframe = aircraft.folder(name)
     except (OSError, ValueError):  # no folder, or no path at all
-        if os.path.isdir(name):  # noqa: PTH112 - knows no error
+        if aircraft.is_folder(name):
             must = f"{name}: the folder must hold airframe.toml and a JSBSim model, {Path(name).name}.xml"
             raise ValueError(must) from None
         near = get_close_matches(name, aircraft.names(), n=1)

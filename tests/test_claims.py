@@ -43,7 +43,9 @@ def on_airframes() -> Findings:
 
 
 def _finding(cell: str) -> Finding:
-    verdict, rest = re.fullmatch(r"\*\*(.*?)\*\*(.*)", cell, re.DOTALL).groups()  # type: ignore[union-attr]
+    match = re.fullmatch(r"\*\*(.*?)\*\*(.*)", cell, re.DOTALL)
+    assert match
+    verdict, rest = match.groups()
     condition, number = rest.split(": ", 1)
     return Finding(Verdict(verdict), number, condition.strip())
 

@@ -1,69 +1,22 @@
-"""Pairs, scorecard and attribution: made-up flights whose answer is known, and real ones."""
+"""Pairs and scorecard: made-up flights whose answer is known."""
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_up import QUIET, SEEDS, flight, moved, over, table
 
-from harness.metrics import MEANING
 from harness.verdict.assess import Assess
 from harness.verdict.attribution import attributions
 from harness.verdict.comparison import Comparison, compare
 from harness.verdict.pairs import CompareError, axes, entered, plant_pairs, spread
 from harness.verdict.scorecard import HOLDS, IF, NOT, UNSHOWN, Cell, conclusion
 from harness.verdict.words import answer, breaks_first, lines
-
-SEEDS = 12
-PLANTS = ("kinematic", "sixdof")
-QUIET = {
-    **dict.fromkeys(MEANING, 0.0), "convergence_time_s": 40.0, "heading_rate_gain": 1.0, "turn_ratio": 1.0,
-    "heading_rate_lag_s": 0.001,
-}  # fmt: skip
-
-
-def flight(plant: str, seed: int = 0, metrics: Mapping[str, float] = QUIET, **settings: object) -> dict[str, object]:
-    base = {
-        "plant": plant, "aircraft": "ultra_stick_25e", "seed": seed, "duration_s": 100.0, "guidance_period_s": 0.05,
-        "law.name": "smc", "law.gains": "paper", "law.k2": math.nan, "law.max_heading_rate_deg_s": 5.0,
-        "law.airspeed": "nominal", "law.standoff_m": 200.0, "start.airspeed_mps": 13.0,
-        "start.heading_deg": 30.0 + seed,
-        "wind.steady_mps": (0.0, 0.0), "wind.turbulence": "none", "estimator.kind": "truth",
-        **settings,
-    }  # fmt: skip
-    key = "-".join(map(str, base.values()))
-    results = {"key": key, "outcome": "completed", "reason": "", "digest": key, "feasibility_margin_deg_s": 1.0}
-    return {**results, "seconds": 0.1, **base, **metrics}
-
-
-def table(rows: Iterator[dict[str, object]] | list[dict[str, object]]) -> pd.DataFrame:
-    return pd.DataFrame(list(rows))
-
-
-def over(**axis: list[object]) -> pd.DataFrame:
-    """All flights of a matrix, quiet on every plant; each metric moves a little with the seed alone."""
-    settings = {"plant": list(PLANTS), "seed": list(range(SEEDS)), **axis}
-    flights = []
-    for values in itertools.product(*settings.values()):
-        chosen = dict(zip(settings, values, strict=True))
-        flights.append(flight(**{key.replace("__", "."): value for key, value in chosen.items()}))
-    return table(flights)
-
-
-def moved(flights: pd.DataFrame, metric: str, by: float, scatter: float = 0.01, **where: object) -> pd.DataFrame:
-    """The metric of the 6-DOF flights that are set so moves by so much, more or less."""
-    flights = flights.copy()
-    chosen = flights["plant"] == "sixdof"
-    for key, value in where.items():
-        chosen &= flights[key.replace("__", ".")] == value
-    seeds = flights["seed"][chosen]
-    flights.loc[chosen, metric] += by + scatter * np.random.default_rng(3).normal(size=SEEDS)[seeds]
-    return flights
-
 
 # Pairs
 
@@ -375,54 +328,3 @@ def test_the_bank_limit_is_the_airframes() -> None:
     limit = math.degrees(0.8)
     assert [cell.mean for cell in reach.cells] == pytest.approx([n - limit for n in needed], abs=0.1)
     assert (reach.verdict, reach.condition) == (IF, "law.max_heading_rate_deg_s <= 33")
-
-
-# Attribution
-
-
-def ladder() -> pd.DataFrame:
-    """Rungs that add 1, 2 and 3 to a metric, wind that adds 10, turbulence 4 and 9."""
-    rungs = ("kinematic", "lagged", "coordinated", "sixdof")
-    rows = []
-    for i, seed, wind, turbulence in itertools.product(range(4), range(6), (0.0, 5.0), ("none", "light", "moderate")):
-        value = (i * (i + 1)) / 2 + 0.1 * seed + 2.0 * wind + {"none": 0.0, "light": 4.0, "moderate": 9.0}[turbulence]
-        metrics = {**QUIET, "range_error_rms_m": value}
-        rows.append(flight(rungs[i], seed, metrics, **{"wind.steady_mps": (wind, 0.0), "wind.turbulence": turbulence}))
-    return table(rows)
-
-
-def test_the_rungs_add_up_from_the_first_plant_to_the_last() -> None:
-    (one,) = attributions(entered(ladder(), 0.25))
-    assert one.rungs == ("kinematic", "lagged", "coordinated", "sixdof")
-    assert one.scenarios == 6 * 2 * 3
-    error = next(ladder for ladder in one.ladders if ladder.metric == "range_error_rms_m")
-    assert [step.effect.mean for step in error.steps] == pytest.approx([1.0, 2.0, 3.0])
-    for whole in one.ladders:
-        assert whole.start + sum(step.effect.mean for step in whole.steps) == pytest.approx(whole.end)
-
-
-def test_a_scenario_missing_on_one_rung_is_left_out_on_all() -> None:
-    flights = ladder()
-    gone = (flights["plant"] == "lagged") & (flights["seed"] == 2)
-    (one,) = attributions(entered(flights[~gone], 0.25))
-    assert one.scenarios == 5 * 2 * 3
-    error = next(ladder for ladder in one.ladders if ladder.metric == "range_error_rms_m")
-    assert error.start + sum(step.effect.mean for step in error.steps) == pytest.approx(error.end)
-
-
-def test_a_rung_that_was_not_flown_is_part_of_the_step_above() -> None:
-    flights = ladder()
-    (one,) = attributions(entered(flights[flights["plant"].isin(["kinematic", "coordinated"])], 0.25))
-    (step,) = one.ladders[0].steps
-    assert step.what == "lag of the heading rate, bank and airspeed dynamics"
-
-
-def test_each_disturbance_adds_what_it_adds_to_the_same_flight_without_it() -> None:
-    (one,) = attributions(entered(ladder(), 0.25))
-    added = {
-        (step.what, step.plant): step.effect.mean for step in one.disturbances if step.metric == "range_error_rms_m"
-    }
-    for plant in ("kinematic", "sixdof"):
-        assert added["wind 5 m/s", plant] == pytest.approx(10.0)
-        assert added["turbulence light", plant] == pytest.approx(4.0)
-        assert added["turbulence moderate", plant] == pytest.approx(9.0)

@@ -10,7 +10,7 @@ from autopilot.laws import law
 from autopilot.nftsm import Nftsm
 from harness.flight import Flight, problems
 from harness.paper.claims_of_the_manifold import inner_rate, manifold
-from harness.paper.columns import Column, EndedEarly
+from harness.paper.columns import Column, EndedEarlyError
 from harness.paper.experiments import LAWS, STRAIGHT, Reading, flight, own
 from harness.paper.ledger import Finding, holds, holds_if, metres, within
 from harness.paper.measures import azimuth, peak, rms, settled, turns
@@ -97,7 +97,7 @@ def _straight(speed: float) -> Target:
 def _held(on: Column, speed: float, limit_deg_s: float) -> bool:
     try:
         return peak(on.fly(own("NFTSM", _straight(speed), 300.0, limit_deg_s)), 200.0) < max(1.0, on.tolerance)
-    except EndedEarly:
+    except EndedEarlyError:
         return False
 
 
@@ -277,7 +277,7 @@ def _late_error(on: Column, one: Flight) -> float:
     """The largest |r| in the last tenth of the flight, m."""
     try:
         return peak(on.sampled(one), 0.9 * one.duration)
-    except EndedEarly:
+    except EndedEarlyError:
         return math.inf
 
 

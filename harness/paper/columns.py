@@ -25,7 +25,7 @@ EVERY_PERIOD = (*(n * _STEP for n in range(1, 101)), *_LONG)  # s, tried by clai
 SOME_PERIODS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 
 
-class EndedEarly(Exception):  # noqa: N818 - an end is no error
+class EndedEarlyError(Exception):
     """A flight ended before its time: on the ground, departed."""
 
 
@@ -55,14 +55,14 @@ class Column(NamedTuple):
         return one if self.period is None else replace(one, guidance_period=self.period, step=_STEP)
 
     def sampled(self, one: Flight) -> Trace:
-        """That flight here, its command held as long as it says. Raises `EndedEarly`."""
+        """That flight here, its command held as long as it says. Raises `EndedEarlyError`."""
         trace = flown(self.real(one))
         if trace.ended:
             raise early(one, trace.ended)
         return trace if self.scale == 1.0 else _in_papers_size(trace, self.change(one), self.scale)
 
     def measured(self, one: Flight) -> dict[str, float | None]:
-        """The metrics of that flight here, airspeeds in the paper's size. Raises `EndedEarly`."""
+        """The metrics of that flight here, airspeeds in the paper's size. Raises `EndedEarlyError`."""
         log = simulate(self.real(self.held(one)))
         if log.outcome is not Outcome.COMPLETED:
             raise early(one, ending(log))
@@ -71,11 +71,11 @@ class Column(NamedTuple):
         return {**found, "airspeed_deviation_rms_mps": None if off is None else off / self.scale}
 
     def fly(self, one: Flight) -> Trace:
-        """That flight here. Raises `EndedEarly`."""
+        """That flight here. Raises `EndedEarlyError`."""
         return self.sampled(self.held(one))
 
     def paper(self, experiment: str, law: str, reading: Reading | None = None, duration: float | None = None) -> Trace:
-        """An experiment of the paper's here, under its reading unless told another. Raises `EndedEarly`."""
+        """An experiment of the paper's here, under its reading unless told another. Raises `EndedEarlyError`."""
         return self.fly(flight(experiment, law, reading, duration))
 
     @property
@@ -89,9 +89,9 @@ class Column(NamedTuple):
         return f"{self.limit:.3g} deg/s"
 
 
-def early(one: Flight, how: str) -> EndedEarly:
+def early(one: Flight, how: str) -> EndedEarlyError:
     """What to raise when this flight ended so."""
-    return EndedEarly(f"the flight of {label(one.law)} over {one.duration:g} s ended: {how}")
+    return EndedEarlyError(f"the flight of {label(one.law)} over {one.duration:g} s ended: {how}")
 
 
 def label(law: Law) -> str:

@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import NamedTuple
 from unicodedata import combining
 
-from harness.paper.columns import COLUMNS, Column, EndedEarly
+from harness.paper.columns import COLUMNS, Column, EndedEarlyError
 
 
 class Verdict(StrEnum):
@@ -93,7 +93,7 @@ def _flown(claim: Flown, column: Column) -> Finding:
     """A flight that ends early is a result: the claim does not hold there."""
     try:
         return claim.decide(column)
-    except EndedEarly as end:
+    except EndedEarlyError as end:
         return Finding(Verdict.NOT, str(end))
 
 

@@ -1,6 +1,5 @@
 """A settings file as it was read: what it says, and where; and the flight in it."""
 
-import os
 import re
 import sys
 import tomllib
@@ -152,7 +151,7 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
         track = str(folder.absolute() / flight.target.track)
         flight = replace(flight, target=replace(flight.target, track=track))
     beside = str(folder.absolute() / flight.aircraft)
-    if flight.aircraft and os.path.isdir(beside) and flight.aircraft not in aircraft.names():  # noqa: PTH112 - knows no error
+    if flight.aircraft and aircraft.is_folder(beside) and flight.aircraft not in aircraft.names():
         flight = replace(flight, aircraft=beside)
     found = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
     if found:
