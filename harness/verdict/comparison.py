@@ -118,8 +118,8 @@ def _mean(values: Sequence[float] | np.ndarray) -> float:
 def axes_of(comparison: Comparison) -> dict[str, list[object]]:
     """What was set to several values on any airframe, and the airframes."""
     flights = spread(comparison.pairs.other)
-    found = {"aircraft": ordered(flights["aircraft"])}
-    found = found if len(found["aircraft"]) > 1 else {}
+    airframes = ordered(flights["aircraft"])
+    found = {"aircraft": airframes} if len(airframes) > 1 else {}
     for _, of in flights.groupby("aircraft"):
         for axis in axes(of):
             found.setdefault(axis, ordered(flights[axis]))

@@ -162,7 +162,8 @@ def unit_of(metric: str) -> str:
 
 def lines(comparison: Comparison) -> Iterator[str]:
     """All of it, for a terminal."""
-    yield from heading(comparison)
+    yield from compared(comparison)
+    yield from left_out(comparison)
     yield ""
     yield from table_lines(comparison.rows, comparison.baseline)
     for card in comparison.scorecards:
@@ -172,8 +173,8 @@ def lines(comparison: Comparison) -> Iterator[str]:
     yield from answer(comparison)
 
 
-def heading(comparison: Comparison) -> Iterator[str]:
-    """What was compared, and what could not be."""
+def compared(comparison: Comparison) -> Iterator[str]:
+    """What was compared, and of what it says nothing."""
     seeds = comparison.pairs.other["seed"].nunique()
     yield (
         f"{_counted(len(comparison.pairs), 'pair')} of {', '.join(comparison.plants)} beside {comparison.baseline}, "
@@ -188,6 +189,13 @@ def heading(comparison: Comparison) -> Iterator[str]:
             f"{astray} of the pairs say nothing of the cost: the law does not circle the target on "
             f"{comparison.baseline} either"
         )
+    unpaired = len(comparison.unpaired) + len(comparison.failed)
+    if unpaired:
+        yield f"{_counted(unpaired, 'flight')} could not be compared"
+
+
+def left_out(comparison: Comparison) -> Iterator[str]:
+    """The flights that could not be compared, and why."""
     yield from _left("without a partner", comparison.unpaired)
     yield from _left("in no pair, since failed", comparison.failed)
 
