@@ -23,8 +23,17 @@ SEEN_COLUMNS = (
     *Estimate._fields[4:],
     *(f"innovation_{name}" for name in Measurement._fields),
 )
-_ROWS_AT_ONCE = 128
 COLUMNS = (*LOOP_COLUMNS, "range_error", *SEEN_COLUMNS)  # the range error is the true one
+# What the digest is made of: how aircraft and target moved, and the command between them. Named one by one, so that a
+# column added to the log changes no digest.
+TRAJECTORY = (
+    "north", "east", "altitude", "velocity_north", "velocity_east", "velocity_down", "airspeed", "heading",
+    "heading_rate", "bank", "roll_rate", "pitch", "yaw", "pitch_rate", "yaw_rate", "aileron", "elevator", "rudder",
+    "throttle", "target_north", "target_east", "target_velocity_north", "target_velocity_east",
+    "target_acceleration", "target_turn_rate", "heading_rate_command",
+)  # fmt: skip
+_TRAJECTORY = [COLUMNS.index(name) for name in TRAJECTORY]
+_ROWS_AT_ONCE = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +53,9 @@ class FlightLog:
 
     @property
     def digest(self) -> str:
-        """A hash of the trajectory to the last bit, and of how it ended. Processors have SHA-256 built in."""
-        content = hashlib.sha256(repr((COLUMNS, self.outcome.value, self.reason)).encode())
+        """A hash of `TRAJECTORY` to the last bit, and of the outcome. Processors have SHA-256 built in."""
+        content = hashlib.sha256(repr((TRAJECTORY, self.outcome.value)).encode())
         for begin in range(0, len(self.table), _ROWS_AT_ONCE):  # so few that they stay in the processor's cache
-            content.update((self.table[begin : begin + _ROWS_AT_ONCE] + 0.0).data)  # + 0.0: minus zero is zero
+            rows = self.table[begin : begin + _ROWS_AT_ONCE, _TRAJECTORY]
+            content.update(np.ascontiguousarray(rows + 0.0).data)  # + 0.0: minus zero is zero
         return content.hexdigest()[:32]
