@@ -30,14 +30,14 @@ identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 
 paper: install  ## the paper's numbers, figures and claims under docs/, on the airframes too (a quarter of an hour)
 	$(BIN)/harness reproduce --out docs --sixdof
-	$(BIN)/python -m harness.paper.identified docs/identified.md
+	$(BIN)/python -m harness.studies.paper.coefficients docs/identified.md
 
 turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (five minutes on two processors)
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/moderate --log none
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/unturned --log none --set wind.rotation=false --limit 60
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
-	$(BIN)/python -m harness.weather out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
+	$(BIN)/python -m harness.studies.turbulence out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
 
 verdict: install  ## fly the full matrix (22 minutes on two processors), compare, and write docs/results.md
 	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none

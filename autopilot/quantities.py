@@ -25,6 +25,13 @@ class About:
 
 
 @dataclass(frozen=True, slots=True)
+class OneOf:
+    """The names that the field may have, where they are declared elsewhere."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Unlimited:
     """The field may be infinite: `inf` in a file."""
 

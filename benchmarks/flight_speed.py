@@ -15,9 +15,9 @@ from functools import partial
 import aircraft
 from autopilot.laws import law
 from harness.flight import Flight, air_of
-from harness.flight_log import COLUMNS
+from harness.log import COLUMNS
+from harness.loop import simulate
 from harness.plants.sixdof import SixDof, engage, load, trim
-from harness.simulation import simulate
 
 AIRFRAMES = ("ultra_stick_25e", "skywalker_x8")
 

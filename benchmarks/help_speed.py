@@ -23,7 +23,9 @@ def seconds(command: Sequence[str]) -> float:
 
 def imported() -> set[str]:
     """The packages that `harness --help` imports."""
-    program = "import sys, harness.cli as c; c.harness.main(['--help'], standalone_mode=False); print(*sys.modules)"
+    program = (
+        "import sys; from harness.cli.main import harness as h; h(['-h'], standalone_mode=False); print(*sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
     return {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
 

@@ -12,11 +12,11 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from benchmarks.flight_speed import spread
-from harness.flight_log import COLUMNS, FlightLog
+from harness.log import COLUMNS, FlightLog
+from harness.loop import simulate
 from harness.review.recording import write_recording
 from harness.review.viewer import headless
 from harness.settings import flight_from_document
-from harness.simulation import simulate
 
 
 def flown(plant: str) -> FlightLog:

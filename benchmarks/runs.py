@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 
 from harness.key import files, identity, version_of
+from harness.loop import simulate
+from harness.provenance import provenance
 from harness.runs.matrix import Matrix, read_matrix
-from harness.runs.provenance import provenance
 from harness.runs.results import export, load_results
 from harness.runs.row import flown, judged, row
 from harness.runs.run import Options, positions_done, run
@@ -22,7 +23,6 @@ from harness.runs.store import Store
 from harness.runs.survey import survey
 from harness.runs.workers import Flown, Task, fly_task
 from harness.settings import read_settings
-from harness.simulation import simulate
 
 ROWS = 100_000
 SETTINGS = """\

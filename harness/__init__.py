@@ -8,10 +8,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from harness.loop import simulate
     from harness.review.reading import read_recording as read_flight
     from harness.runs.results import load_results
     from harness.settings import load_flight
-    from harness.simulation import simulate
 
 __all__ = ["load_flight", "load_results", "read_flight", "simulate"]
 
@@ -19,7 +19,7 @@ _HOME = {
     "load_flight": ("harness.settings", "load_flight"),
     "load_results": ("harness.runs.results", "load_results"),
     "read_flight": ("harness.review.reading", "read_recording"),
-    "simulate": ("harness.simulation", "simulate"),
+    "simulate": ("harness.loop", "simulate"),
 }
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
-from harness.air import Air
-from harness.plant import Start
+from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof, load, si, trim
+from harness.world.air import Air
 
 PACKAGES = ("standoff-harness", "jsbsim", "numpy", "filterpy", "pandas", "pydantic", "rerun-sdk")
 WIND_TOLERANCE = 1e-6  # m/s

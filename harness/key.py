@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import aircraft
 import autopilot
-from harness.flight import IDENTIFIED_PLANTS, Flight
+from harness.flight import Flight
+from harness.plants.ladder import PLANTS
 from harness.settings import document
 
 PHYSICS = 2  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
@@ -44,7 +45,7 @@ def identity(flight: Flight) -> Identity:
 def version_of(flight: Flight) -> Version:
     """All that decides the flight beside its settings, as it is now. OSError when a file is gone."""
     libraries = {
-        "jsbsim": ("jsbsim",) if flight.plant == "sixdof" else (),
+        "plant": PLANTS[flight.plant].libraries,
         "turbulence": ("numpy", "scipy") if flight.wind.turbulence != "none" else (),
         "filterpy": ("filterpy",) if flight.estimator.kind == "ekf" else (),
     }
@@ -69,16 +70,9 @@ def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, Path], 
     found = {f"autopilot/{path.name}": path for path in sorted(on_board.glob("*.py"))}
     if track is not None:
         found["target/track"] = Path(track)
-    if plant == "sixdof":
-        found["autopilot/inner_loop.xml"] = on_board / "inner_loop.xml"
-        found["harness/plants/planet.xml"] = Path(__file__).parent / "plants" / "planet.xml"
-    if plant != "kinematic":
-        airframe = aircraft.folder(name)
-        found["aircraft/model"] = aircraft.model(airframe)
-        names = ["airframe.toml", "inner_loop.toml"]
-        if plant in IDENTIFIED_PLANTS:
-            names.append(aircraft.identified(airframe).name)
-        found |= {f"aircraft/{name}": airframe / name for name in names}
+    kind = PLANTS[plant]
+    if kind.has_airframe:
+        found |= kind.files(aircraft.folder(name))
     return tuple(found.items())
 
 

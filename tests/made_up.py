@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pandas as pd
 
-from harness.metrics import MEANING
+from harness.metric import MEANING
 
 SEEDS = 12
 PLANTS = ("kinematic", "sixdof")

@@ -8,15 +8,16 @@ import pytest
 
 import aircraft
 from autopilot.laws import law
-from harness.air import Air
+from harness.checks import problems
 from harness.doctor import wind_triangle_error
-from harness.flight import Flight, air_of, problems
-from harness.plant import Start
+from harness.flight import Flight, air_of
+from harness.loop import observe, simulate
 from harness.plants.kinematic import Kinematic
+from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof
-from harness.simulation import observe, simulate
-from harness.target import TargetState
-from harness.wind import Gust, Wind
+from harness.world.air import Air
+from harness.world.target import TargetState
+from harness.world.wind import Gust, Wind
 
 STICK = aircraft.folder("ultra_stick_25e")
 GUST = Gust(from_=1.0, to=3.0, velocity=(2.0, -4.0, 1.0))

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 import aircraft
 from aircraft.write_models import jsbsim_model
-from harness.air import Air
-from harness.plant import Start
+from harness.plants.plant import Start
 from harness.plants.sixdof import FT, SLUG, NoTrimError, engage, load, trim
+from harness.world.air import Air
 
 LBF = 4.4482216152605  # N
 AIRFRAMES = aircraft.names()

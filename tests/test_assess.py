@@ -9,9 +9,9 @@ from typing import Annotated, get_args, get_origin, get_type_hints
 import pytest
 
 from autopilot.quantities import About
+from harness.margins import Assess
 from harness.settings import SettingsError, load_flight, read_settings, settings_from_text
 from harness.settings.written import written
-from harness.verdict.assess import Assess
 
 FILE = """\
 [flight]

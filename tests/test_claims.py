@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from harness.flight import Flight
-from harness.paper.airframes import FLOWN_ON
-from harness.paper.claims import CLAIMS
-from harness.paper.columns import AIRFRAMES, COLUMNS, CONDITIONS, GRID, Column, column, scaled
-from harness.paper.documents import airframes_markdown, row
-from harness.paper.experiments import LAWS, Reading, flight
-from harness.paper.job import Part, computed, flown_claims, theory
-from harness.paper.ledger import Finding, Findings, Flown, Verdict, decided, holds, holds_if
-from harness.simulation import simulate
-from harness.wind import Wind
+from harness.loop import simulate
+from harness.studies.paper.airframes import FLOWN_ON
+from harness.studies.paper.claims import CLAIMS
+from harness.studies.paper.columns import AIRFRAMES, COLUMNS, CONDITIONS, GRID, Column, column, scaled
+from harness.studies.paper.documents import airframes_markdown, row
+from harness.studies.paper.experiments import LAWS, Reading, flight
+from harness.studies.paper.job import Part, computed, flown_claims, theory
+from harness.studies.paper.ledger import Finding, Findings, Flown, Verdict, decided, holds, holds_if
+from harness.world.wind import Wind
 
 DOCS = Path(__file__).parent.parent / "docs"
 FLOWN = [claim for claims in CLAIMS.values() for claim in claims if isinstance(claim, Flown)]
@@ -208,7 +208,7 @@ def _gone(group: int) -> bool:
 
 def test_the_coefficients_document_says_what_the_flights_say() -> None:
     """The fitted and unfitted numbers in full, one row of the map; that no other pair fits is left to `make paper`."""
-    from harness.paper.identified import BETA2, COARSE, FINE, map_row, point, unfitted_rows
+    from harness.studies.paper.coefficients import BETA2, COARSE, FINE, map_row, point, unfitted_rows
 
     committed = (DOCS / "identified.md").read_text(encoding="utf-8").splitlines()
     for line in unfitted_rows():

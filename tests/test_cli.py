@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import aircraft
-from harness.commands.telling import BadInput, flight_of, read_file, writable, writable_folder
+from harness.cli._input import BadInput, flight_of, read_file, writable, writable_folder
 
 FILE = """\
 [flight]
@@ -197,7 +197,7 @@ def test_a_law_that_leaves_its_domain_is_flown_with_warnings(file: Path) -> None
 def test_help_needs_none_of_the_heavy_libraries() -> None:
     code = (
         "import sys\n"
-        "from harness.cli import harness\n"
+        "from harness.cli.main import harness\n"
         "harness.main(['--help'], standalone_mode=False)\n"
         "heavy = {'jsbsim', 'pandas', 'rerun', 'scipy', 'matplotlib', 'numpy', 'pydantic'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"

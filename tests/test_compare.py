@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import aircraft
-from harness.cli import harness as command_line
+from harness.cli.main import harness as command_line
 
 EXPERIMENT = """\
 title = "Two limits"

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from harness import demo
-from harness.cells import number
-from harness.flight_log import COLUMNS
-from harness.plant import Outcome
+from harness.cli import _demo as demo
+from harness.log import COLUMNS
+from harness.plants.plant import Outcome
 from harness.review.reading import read_recording
+from harness.tables import number
 
 Flights = list[demo.Flown]
 

@@ -15,14 +15,15 @@ from hypothesis import strategies as st
 from autopilot.estimator import Estimator, Measurement, Tracker, initial, linearised, measurement, residual
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.laws import law
-from harness.estimation import Estimation, sensor
-from harness.flight import Flight, MetricSettings, air_of, plant_of, problems
-from harness.flight_log import COLUMNS, FlightLog
-from harness.paper.consistency import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
-from harness.plant import Outcome
-from harness.randomness import stream
-from harness.simulation import command, observe, simulate
-from harness.target import Segment, Target, TargetState
+from harness.checks import problems
+from harness.flight import Flight, MetricSettings, air_of, plant_of
+from harness.knowledge import Estimation, sensor
+from harness.log import COLUMNS, FlightLog
+from harness.loop import command, observe, simulate
+from harness.plants.plant import Outcome
+from harness.studies.estimator import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
+from harness.world.randomness import stream
+from harness.world.target import Segment, Target, TargetState
 
 PAPER = Estimator(kind="ekf")
 MOVING = Target(speed=2.0, heading=-0.8, segments=(Segment(from_=2.0, to=20.0, acceleration=0.1, turn_rate=0.05),))
@@ -319,7 +320,7 @@ def test_who_knows_the_truth_loads_no_filter() -> None:
         "import sys\n"
         "from autopilot.laws import law\n"
         "from harness.flight import Flight\n"
-        "from harness.simulation import simulate\n"
+        "from harness.loop import simulate\n"
         "simulate(Flight(plant='kinematic', law=law('smc'), duration=1.0))\n"
         "heavy = {'filterpy', 'scipy', 'jsbsim', 'matplotlib'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from autopilot.laws import law
-from harness.air import Air
-from harness.flight import Flight, feasibility_margin, needed_rate, problems, warnings
+from harness.checks import problems
+from harness.feasibility import feasibility_margin, needed_rate, warnings
+from harness.flight import Flight
 from harness.key import flight_key
-from harness.plant import Start
+from harness.loop import simulate
 from harness.plants.kinematic import Kinematic
-from harness.simulation import simulate
-from harness.target import Segment, Target
-from harness.wind import Wind
+from harness.plants.plant import Start
+from harness.world.air import Air
+from harness.world.target import Segment, Target
+from harness.world.wind import Wind
 
 FLIGHT = Flight(plant="kinematic", law=law("smc", max_heading_rate=math.radians(5.0)))
 

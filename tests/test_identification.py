@@ -10,8 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import aircraft
-from harness.air import Air
-from harness.commands.identify import identify
+from harness.cli.identify import identify
 from harness.identification.fit import (
     Fitted,
     airspeed_change,
@@ -29,12 +28,13 @@ from harness.identification.identify import (
     step_response,
 )  # fmt: skip
 from harness.identification.manoeuvres import CHATTER, HELD_OUT, STEP, TRAINING, Record, flown, held, lines, sweep
-from harness.plant import Start
 from harness.plants.coordinated import AirspeedHold
 from harness.plants.identified import document, identified, is_stale, read
 from harness.plants.lagged import Lagged
+from harness.plants.plant import Start
 from harness.plants.response import Response, plain
-from harness.state import State
+from harness.plants.state import State
+from harness.world.air import Air
 
 KNOWN = Response(
     delay=0.033, frequency=9.0, damping=0.7, lead=-0.02, sideslip_frequency=3.0, sideslip_damping=0.4,

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import aircraft
-from harness.air import Air
-from harness.plant import Start
+from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof
-from harness.state import State
+from harness.plants.state import State
+from harness.world.air import Air
 
 AIRFRAMES = aircraft.names()
 STEP = 0.005

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.air import Air
-from harness.plant import Start
 from harness.plants.kinematic import Kinematic
+from harness.plants.plant import Start
+from harness.world.air import Air
 
 START = Start(position=(5.0, -7.0), heading=0.3, airspeed=13.0)
 WIND = Air(steady=(1.5, -2.5))

@@ -13,17 +13,19 @@ from hypothesis import strategies as st
 
 import aircraft
 from autopilot.laws import law
-from harness.air import Air
-from harness.flight import Flight, plant_of, problems, warnings
+from harness.checks import problems
+from harness.feasibility import warnings
+from harness.flight import Flight, plant_of
 from harness.key import flight_key
-from harness.metrics import metrics
-from harness.plant import Flying, Plant, Start
+from harness.loop import simulate
+from harness.metric import metrics
 from harness.plants.coordinated import AirspeedHold, Coordinated
 from harness.plants.identified import identified
 from harness.plants.kinematic import Kinematic
 from harness.plants.lagged import Lagged
+from harness.plants.plant import Flying, Plant, Start
 from harness.plants.response import Response, plain
-from harness.simulation import simulate
+from harness.world.air import Air
 
 START = Start(position=(5.0, -7.0), heading=0.3, airspeed=13.0)
 STILL = Air()

@@ -7,9 +7,9 @@ import pytest
 
 from autopilot.laws import law
 from harness.flight import Flight
-from harness.flight_log import COLUMNS, FlightLog
-from harness.metrics import MEANING, metrics
-from harness.plant import Outcome
+from harness.log import COLUMNS, FlightLog
+from harness.metric import MEANING, metrics
+from harness.plants.plant import Outcome
 
 TIME = np.arange(0.0, 100.0, 0.05)
 

@@ -9,12 +9,13 @@ import pytest
 from click.testing import CliRunner
 
 from autopilot.guidance import Guidance, Observation, Step
-from harness.commands.predict import predict
+from harness.cli.predict import predict
 from harness.identification.manoeuvres import STEP
+from harness.limit_cycle.prediction import VISIBLE, Loop, boundary, critical_gain, limit_cycle
 from harness.plants.lagged import Lagged
 from harness.plants.response import plain
 from harness.plants.sixdof import SixDof
-from harness.verdict.limit_cycle import (
+from harness.studies.limit_cycle import (
     AIRFRAMES,
     AMPLITUDE_WITHIN,
     FREQUENCY_WITHIN,
@@ -23,7 +24,6 @@ from harness.verdict.limit_cycle import (
     loop_of,
     with_gains,
 )
-from harness.verdict.prediction import VISIBLE, Loop, boundary, critical_gain, limit_cycle
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "limit_cycle.md"
 EXPERIMENT = Path(__file__).parents[1] / "experiments" / "stationary.toml"

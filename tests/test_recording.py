@@ -14,13 +14,13 @@ from rerun.chunk import Chunk, RrdReader
 from autopilot.estimator import Estimator
 from autopilot.laws import law
 from harness.flight import Flight, MetricSettings
-from harness.flight_log import COLUMNS, FlightLog
-from harness.plant import Outcome
+from harness.log import COLUMNS, FlightLog
+from harness.loop import simulate
+from harness.plants.plant import Outcome
 from harness.review.reading import read_logs, read_recording
 from harness.review.recording import write_recording
 from harness.review.viewer import RERUN, quiet
-from harness.simulation import simulate
-from harness.wind import Wind
+from harness.world.wind import Wind
 
 PERIOD_NS = 50_000_000
 

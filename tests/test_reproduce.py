@@ -7,12 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.paper.experiments import EXPERIMENTS, NEITHER, NO_ACCELERATION, Reading, flight, flown
-from harness.paper.figures import LAWS_DRAWN, sketch
-from harness.paper.job import Part, theory
-from harness.paper.measures import delay, restricted, settled
-from harness.paper.page import page
-from harness.paper.reproduce import NUMBERS, VARIANTS, Number, Reproduced, moved, reproduced, shown, table, under
+from harness.studies.paper.experiments import EXPERIMENTS, NEITHER, NO_ACCELERATION, Reading, flight, flown
+from harness.studies.paper.figures import LAWS_DRAWN, sketch
+from harness.studies.paper.job import Part, theory
+from harness.studies.paper.measures import delay, restricted, settled
+from harness.studies.paper.page import page
+from harness.studies.paper.reproduce import (
+    NUMBERS,
+    VARIANTS,
+    Number,
+    Reproduced,
+    moved,
+    reproduced,
+    shown,
+    table,
+    under,
+)
 
 README = Path(__file__).parent.parent / "README.md"
 TABLE_3 = [number for number in NUMBERS if number.where == "Table 3" and number.law != "NFTSM as printed"]

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 import harness
-from harness.metrics import MEANING
+from harness.metric import MEANING
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, mixed_versions
 from harness.runs.run import Options, Progress, run

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.laws import LAWS, law
-from harness.flight import Flight, feasibility_margin, warnings
-from harness.plant import Start
+from harness.feasibility import feasibility_margin, warnings
+from harness.flight import Flight
+from harness.plants.plant import Start
 from harness.settings import (
     SettingsError,
     document,
@@ -22,7 +23,7 @@ from harness.settings import (
     put,
     read_settings,
 )
-from harness.target import Segment
+from harness.world.target import Segment
 
 STATIONARY = Path(__file__).parent.parent / "experiments" / "stationary.toml"
 SHORTEST = '[flight]\nplant = "kinematic"\n[flight.law]\nname = "nftsm"\n'

@@ -15,14 +15,14 @@ import pytest
 import aircraft
 from autopilot.guidance import Guidance, Observation, Step
 from autopilot.laws import law
-from harness.air import Air
 from harness.doctor import wind_triangle_error
 from harness.flight import Flight
-from harness.plant import End, Outcome, PlantError, Start
+from harness.loop import simulate
+from harness.plants.plant import End, Outcome, PlantError, Start
 from harness.plants.sixdof import ModelError, SixDof, load, write
-from harness.simulation import simulate
-from harness.target import Segment, Target
-from harness.wind import Wind
+from harness.world.air import Air
+from harness.world.target import Segment, Target
+from harness.world.wind import Wind
 
 STEP = 0.005
 STICK = aircraft.folder("ultra_stick_25e")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from harness.target import Segment, Target
+from harness.world.target import Segment, Target
 
 SECTION_4_3 = Target(
     speed=2.0,

@@ -10,9 +10,12 @@ from scipy.integrate import quad, solve_ivp
 
 from autopilot.laws import law
 from autopilot.nftsm import Nftsm, reaching
-from harness.flight import Flight, needed_rate
-from harness.flight_log import FlightLog
-from harness.paper.theory import (
+from harness.feasibility import needed_rate
+from harness.flight import Flight
+from harness.log import FlightLog
+from harness.loop import simulate
+from harness.plants.plant import Start
+from harness.studies.paper.theory import (
     boundary_heading_error,
     ftsm_time,
     longest_stable_period,
@@ -20,10 +23,8 @@ from harness.paper.theory import (
     reaching_time,
     tsm_time,
 )
-from harness.plant import Start
-from harness.simulation import simulate
-from harness.target import Target
-from harness.wind import Wind
+from harness.world.target import Target
+from harness.world.wind import Wind
 
 
 def gains(**override: float) -> Nftsm:

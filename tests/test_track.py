@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from autopilot.laws import law
-from harness.flight import Flight, problems, relative_speed, warnings
+from harness.checks import problems
+from harness.feasibility import relative_speed, warnings
+from harness.flight import Flight
 from harness.key import flight_key
+from harness.loop import simulate
 from harness.settings import SettingsError, document, flight_from_document, load_flight
-from harness.simulation import simulate
-from harness.target import Target
-from harness.track import TrackError, load_track
-from harness.wind import Wind
+from harness.world.target import Target
+from harness.world.track import TrackError, load_track
+from harness.world.wind import Wind
 
 HEADER = "time_s, north_m, east_m"
 

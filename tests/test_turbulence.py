@@ -14,15 +14,16 @@ from scipy.signal import welch
 
 import aircraft
 from autopilot.laws import law
-from harness.air import Air, Array
+from harness.checks import problems
 from harness.doctor import wind_triangle_error
-from harness.flight import Flight, air_of, problems
-from harness.plant import End, Outcome, Start
+from harness.flight import Flight, air_of
+from harness.loop import simulate
+from harness.plants.plant import End, Outcome, Start
 from harness.plants.sixdof import SixDof, engage, load, trim, write
-from harness.randomness import stream
-from harness.simulation import simulate
-from harness.turbulence import FOOT, W20, Dryden, _gradient, dryden, lag_chain, turbulence
-from harness.wind import Wind
+from harness.world.air import Air, Array
+from harness.world.randomness import stream
+from harness.world.turbulence import FOOT, W20, Dryden, _gradient, dryden, lag_chain, turbulence
+from harness.world.wind import Wind
 
 MODERATE = dryden("moderate", 13.0, 150.0)
 SPAN = 1.27

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_up import QUIET, SEEDS, flight, moved, over, table
 
-from harness.verdict.assess import Assess
+from harness.margins import Assess
 from harness.verdict.attribution import attributions
 from harness.verdict.comparison import Comparison, compare
 from harness.verdict.pairs import CompareError, axes, entered, plant_pairs, spread

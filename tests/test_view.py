@@ -9,10 +9,11 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
 
-from harness.cli import harness
-from harness.flight_log import COLUMNS
-from harness.review.chosen import named, plants
+from harness.cli.main import harness
+from harness.log import COLUMNS
+from harness.plants.ladder import PLANTS
 from harness.review.reading import read_logs
+from harness.runs.logs import named
 from harness.runs.matrix import read_matrix
 from harness.runs.results import load_results
 from harness.runs.run import Options, run
@@ -58,7 +59,7 @@ def test_a_pair_is_the_same_flight_on_each_plant_with_the_kinematic_one_first(ou
     done = command("view", out, "--pair", key_of(out, "sixdof", "paper")[:6], "--save", tmp_path / "pair.rrd")
     assert done.exit_code == 0, done.output
     logs = read_logs(tmp_path / "pair.rrd")
-    assert list(logs) == list(plants())
+    assert list(logs) == list(PLANTS)
     digests = load_results(out).set_index("key")["digest"]
     for plant in ("kinematic", "sixdof"):
         assert logs[plant].digest == digests[key_of(out, plant, "paper")]

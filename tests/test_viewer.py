@@ -13,13 +13,13 @@ from rerun.experimental import ViewerClient
 from autopilot.estimator import Estimator
 from autopilot.laws import law
 from harness.flight import Flight
-from harness.flight_log import FlightLog
+from harness.log import FlightLog
+from harness.loop import simulate
 from harness.review.live import Live
 from harness.review.recording import write_recording
 from harness.review.viewer import ViewerError, free_port, headless, listening, quiet
-from harness.simulation import simulate
-from harness.target import Target
-from harness.wind import Gust, Wind
+from harness.world.target import Target
+from harness.world.wind import Gust, Wind
 
 DRIVERS = [*Path("/usr/share/vulkan/icd.d").glob("*.json"), *Path("/etc/vulkan/icd.d").glob("*.json")]
 drawing = pytest.mark.skipif(

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from harness.drawing import draw
 from harness.identification.fit import followed
 from harness.identification.identify import Identification
 from harness.identification.manoeuvres import FASTEST, SLOWEST, STEP, held, lines
-from harness.paper.figures import draw
 
 _SHOWN = 3.0  # s, of the steps
 _COLOURS = ("#9ecae1", "#6baed6", "#3182bd", "#08519c", "#08306b")

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
-from harness.air import Air
 from harness.identification import manoeuvres
 from harness.identification.fit import Array, Fitted, airspeed_change, fit, fit_airspeed, means
 from harness.identification.manoeuvres import (
@@ -25,10 +24,12 @@ from harness.identification.manoeuvres import (
     held,
     sweep,
 )
-from harness.plant import Plant, Start
-from harness.plants.coordinated import GRAVITY, bank_of
+from harness.plants.coordinated import bank_of
 from harness.plants.identified import Identified
-from harness.state import State
+from harness.plants.plant import Plant, Start
+from harness.plants.state import State
+from harness.plants.turn import rate_of_turn
+from harness.world.air import Air
 
 _BANK = State._fields.index("bank")
 _SHOWN = 10.0  # s, of the steps
@@ -148,7 +149,7 @@ def step_response(record: Record) -> StepResponse:
     before = max(after - 1, 0)
     lag = STEP * (0.5 + float(np.interp(reached, share[[before, after]], [before, after])))  # a mean is of mid-step
     last = slice(-round(2.0 / STEP), None)
-    coordinated = GRAVITY * np.tan(record["bank"]) / record["airspeed"]
+    coordinated = rate_of_turn(record["airspeed"], record["bank"])
     gain = float(share[last].mean())
     return StepResponse(
         amplitude=amplitude,

@@ -9,11 +9,11 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.air import Air
-from harness.plant import Start
+from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof
-from harness.randomness import stream
-from harness.state import State
+from harness.plants.state import State
+from harness.world.air import Air
+from harness.world.randomness import stream
 
 Array = NDArray[np.float64]
 

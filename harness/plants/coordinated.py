@@ -10,12 +10,12 @@ from annotated_types import Gt
 
 from autopilot.angles import wrap
 from autopilot.quantities import About
-from harness.air import Air
-from harness.plant import Flying, Start
 from harness.plants.level import Level
+from harness.plants.plant import Flying, Start
 from harness.plants.response import Motion, Response, dot, gauss
+from harness.plants.turn import GRAVITY, bank_of_turn
+from harness.world.air import Air
 
-GRAVITY = 9.80665  # m/s^2
 _NODES = 3  # of the collocation in a piece of at most 50 ms
 _GAUSS_NODES, _WEIGHTS_TO_END, _WEIGHTS_TO_NODES = gauss(_NODES)
 _WEIGHTS = tuple(float(weight) for weight in _WEIGHTS_TO_END)
@@ -81,7 +81,7 @@ class _CoordinatedFlying:
 
 def bank_of(heading_rate: float, airspeed: float, limit: float) -> float:
     """The bank of a coordinated turn, tan(bank) = V rate / g, within +-limit. rad."""
-    return max(-limit, min(limit, math.atan(airspeed * heading_rate / GRAVITY)))
+    return max(-limit, min(limit, bank_of_turn(airspeed, heading_rate)))
 
 
 @lru_cache(maxsize=64)

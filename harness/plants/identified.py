@@ -12,13 +12,17 @@ import aircraft
 import autopilot
 from harness.plants.coordinated import AirspeedHold, Coordinated
 from harness.plants.lagged import Lagged
+from harness.plants.plant import PlantError
 from harness.plants.response import Response
 
 _NEAR = 0.05  # of the airspeed: farther from it the response is another
 
 
-class IdentifiedError(ValueError):
+class IdentifiedError(PlantError):
     """There is no identification for this airframe at this airspeed; the text says what to do."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__("start.airspeed", message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +55,7 @@ def identified(airframe: Path, airspeed: float) -> Identified:
         at = f"identified at {speeds} m/s" if known else "not identified"
         raise IdentifiedError(
             f"{airframe.name} is {at}, the flight is at {airspeed:g} m/s: "
-            f"run harness identify {_called(airframe)} --airspeed {airspeed:g}"
+            f"run harness identify {called(airframe)} --airspeed {airspeed:g}"
         )
     return near
 
@@ -65,7 +69,7 @@ def read(airframe: Path) -> list[Identified]:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))["at"]
         return sorted((_from(table) for table in tables), key=lambda one: one.airspeed)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
-        again = f"run harness identify {_called(airframe)}"
+        again = f"run harness identify {called(airframe)}"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
 
 
@@ -85,7 +89,7 @@ def model_digest(airframe: Path) -> str:
 def document(airframe: Path, known: list[Identified]) -> str:
     """The file's text."""
     lines = [
-        f"# Written by `harness identify {_called(airframe)}`: what the plants lagged and coordinated fly by. SI, rad.",
+        f"# Written by `harness identify {called(airframe)}`: what the plants lagged and coordinated fly by. SI, rad.",
         "",
         f'model = "{model_digest(airframe)}" # of the model and inner loop that were flown',
     ]
@@ -121,6 +125,6 @@ def _numbers(table: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, value in table.items()}
 
 
-def _called(airframe: Path) -> str:
+def called(airframe: Path) -> str:
     """What the user calls the airframe: its name, or its folder."""
     return airframe.name if airframe.parent == aircraft.FOLDER else str(airframe)

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 from autopilot.angles import wrap
-from harness.air import Air
-from harness.plant import Flying, Start
 from harness.plants.level import Level
+from harness.plants.plant import Flying, Start
+from harness.world.air import Air
 
 
 @dataclass(frozen=True, slots=True)

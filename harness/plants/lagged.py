@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 
 from autopilot.angles import wrap
-from harness.air import Air
-from harness.plant import Flying, Start
 from harness.plants.level import Level
+from harness.plants.plant import Flying, Start
 from harness.plants.response import Motion, Response, dot, gauss
+from harness.world.air import Air
 
 _NODES = 4  # of the quadrature of the position in a piece of at most 50 ms
 _WEIGHTS = tuple(float(weight) for weight in gauss(_NODES)[1])

@@ -2,9 +2,9 @@
 
 import math
 
-from harness.air import Air
-from harness.plant import Start
-from harness.state import State
+from harness.plants.plant import Start
+from harness.plants.state import State
+from harness.world.air import Air
 
 _UNKNOWN = (math.nan,) * (State._fields.index("throttle") - State._fields.index("bank_command"))
 

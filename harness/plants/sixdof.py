@@ -15,14 +15,14 @@ import numpy as np
 import aircraft
 import autopilot
 from autopilot.angles import wrap
-from harness.air import Air, Vector
-from harness.plant import End, Outcome, PlantError, Start
-from harness.state import State
+from harness.plants.plant import End, Outcome, PlantError, Start
+from harness.plants.state import State
+from harness.plants.turn import GRAVITY
+from harness.world.air import Air, Vector
 
 FT = 0.3048  # m
 SLUG = 4.4482216152605 / FT  # kg
 _SI = {"ft": FT, "fps": FT, "sqft": FT**2, "slugs": SLUG, "slugs_ft2": SLUG * FT**2}
-GRAVITY = 9.80665  # m/s^2
 RADIUS = 6371000.0  # m, as in planet.xml
 GROUND = 15.0  # m: below this height the flight has ended
 DEPARTURE_BANK = math.radians(80.0)

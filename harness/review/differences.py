@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from harness.plants.turn import banks_of_turns
 from harness.review.plots import DEG, Array, Plot, Series, end, finite, level, span
 from harness.review.shown import Shown
-
-GRAVITY = 9.80665  # m/s^2
 
 _DIFFERENCES = (
     ("range_error", "Range error", "m", 1.0),
@@ -45,4 +44,4 @@ def _expected(column: str, reference: Shown) -> Array:
     values = log[column]
     if not np.isnan(values).all():
         return values
-    return np.arctan(log["airspeed"] * log["heading_rate"] / GRAVITY) if column == "bank" else np.zeros(len(log))
+    return banks_of_turns(log["airspeed"], log["heading_rate"]) if column == "bank" else np.zeros(len(log))

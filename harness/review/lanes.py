@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
-from harness.flight_log import FlightLog
-from harness.metrics import settling_time
-from harness.plant import Outcome
+from harness.log import FlightLog
+from harness.metric import settling_time
+from harness.plants.plant import Outcome
 from harness.review.shown import Colour
 
 WINDOW = 1.0  # s: a lane tells of windows this long, so that a command that chatters can be read

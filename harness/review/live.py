@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import rerun as rr
 
-from harness.flight_log import FlightLog
+from harness.log import FlightLog
 from harness.review.lanes import Change, lanes
 from harness.review.layout import Content, layout
 from harness.review.plots import Plot
@@ -22,7 +22,7 @@ _PATIENCE = 2.0  # s: longer than this no parcel takes, unless the viewer is gon
 
 
 class Live:
-    """Watches a flight (`harness.simulation.Watch`) and streams it; `finish` tells what is known only in the end."""
+    """Watches a flight (`harness.loop.Watch`) and streams it; `finish` tells what is known only in the end."""
 
     def __init__(self, name: str, title: str, pace: float, port: int = PORT) -> None:
         """`pace` is times real time; infinite: as fast as it flies. Raises `ViewerError` when there is no viewer."""

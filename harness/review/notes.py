@@ -5,15 +5,15 @@ import platform
 from collections.abc import Sequence
 from functools import cache
 
-from harness.cells import number
-from harness.flight import feasibility_line, warnings
-from harness.flight_log import FlightLog
+from harness.feasibility import feasibility_line, warnings
 from harness.key import PHYSICS, flight_key
-from harness.metrics import MEANING, metrics
+from harness.log import FlightLog
+from harness.metric import MEANING, metrics
+from harness.provenance import packages
 from harness.review.shown import Shown
-from harness.runs.provenance import packages
-from harness.runs.results import flat_settings
 from harness.settings import document
+from harness.settings.columns import by_column
+from harness.tables import number
 
 _packages = cache(packages)
 
@@ -46,9 +46,9 @@ def settings_notes(flights: Sequence[Shown]) -> str:
     parts.append(
         _table([["flight", "key", "digest"], *([f.name, flight_key(f.log.flight), f.log.digest] for f in flights)])
     )
-    first = flat_settings(document(flights[0].log.flight))
+    first = by_column(document(flights[0].log.flight))
     for one in flights[1:]:
-        other = flat_settings(document(one.log.flight))
+        other = by_column(document(one.log.flight))
         differs = [
             [k, _word(first.get(k)), _word(other.get(k))] for k in {**first, **other} if first.get(k) != other.get(k)
         ]

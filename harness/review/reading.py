@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
-from harness.flight_log import COLUMNS, FlightLog
-from harness.plant import Outcome
+from harness.log import COLUMNS, FlightLog
+from harness.plants.plant import Outcome
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from harness.flight_log import COLUMNS, FlightLog
+from harness.files import whole
+from harness.log import COLUMNS, FlightLog
 from harness.review.differences import difference_plots
 from harness.review.lanes import COLOURS, Change, events, lanes, summary
 from harness.review.layout import Content, layout
@@ -17,7 +18,6 @@ from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
 from harness.review.shown import Shown, shown
 from harness.review.target_plots import target_plots
-from harness.whole import whole
 
 Logs = Mapping[str, FlightLog]
 

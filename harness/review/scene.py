@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from harness.flight import Flight
-from harness.flight_log import FlightLog
+from harness.log import FlightLog
 from harness.review.airframe import airframe, size
 from harness.review.recorder import Recorder
 from harness.review.shown import ESTIMATE, TARGET, WIND, Colour, Shown, mixed

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 from rerun.experimental import ViewerClient
 
-from harness.flight_log import FlightLog
+from harness.log import FlightLog
+from harness.loop import simulate
 from harness.review.recording import write_recording
 from harness.review.viewer import headless
 from harness.settings import flight_from_document
-from harness.simulation import simulate
 
 FOLDER = Path("docs/images")
 TABS = ("overview", "cursor", "aircraft", "target", "notes")

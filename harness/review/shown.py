@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from harness.flight_log import FlightLog
+from harness.log import FlightLog
+from harness.plants.ladder import rung
 
 Colour = tuple[int, int, int]
 
@@ -23,9 +24,7 @@ _MAGENTA: Colour = (230, 110, 230)
 _YELLOW: Colour = (240, 220, 80)
 _CYAN: Colour = (90, 225, 235)
 _PALETTE = (_PALE_BLUE, _ORANGE, _GREEN, _MAGENTA, _YELLOW, _CYAN)
-_PLANTS: Mapping[str, Colour] = MappingProxyType(
-    {"kinematic": _PALE_BLUE, "lagged": _GREEN, "coordinated": _MAGENTA, "sixdof": _ORANGE}
-)
+_RUNGS = (_PALE_BLUE, _GREEN, _MAGENTA, _ORANGE)  # of the plants, up the ladder
 WORDS: Mapping[Colour, str] = MappingProxyType(
     {
         _PALE_BLUE: "pale blue",
@@ -53,7 +52,7 @@ def shown(logs: Mapping[str, FlightLog]) -> list[Shown]:
     if not 1 <= len(logs) <= MOST:
         raise ValueError(f"{len(logs)} flights: a recording shows 1 to {MOST}")
     plants = [log.flight.plant for log in logs.values()]
-    colours = [_PLANTS.get(plant, _YELLOW) for plant in plants]
+    colours = [_RUNGS[rung(plant)] if 0 <= rung(plant) < len(_RUNGS) else _YELLOW for plant in plants]
     if len(set(colours)) < len(colours):
         colours = list(_PALETTE[: len(colours)])
     widths = [_WIDE if len(logs) > 1 else _THIN, *[_THIN] * (len(logs) - 1)]

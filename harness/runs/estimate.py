@@ -1,12 +1,12 @@
 """How long flights take: a guess from their length, corrected by those that were flown."""
 
 from harness.flight import Flight
+from harness.plants.ladder import PLANTS
 
 CHUNK = 0.3  # s of flights in one message to a worker
-# Seconds on the machine of `make bench`: of any plant per guidance period, per step of JSBSim, gust, measurement.
-_PERIOD, _STEP, _GUST, _SAMPLE = 6e-6, 6.5e-6, 1e-6, 60e-6
-_RUNGS = {"lagged": 20e-6, "coordinated": 45e-6}  # per guidance period, or per 50 ms of a longer one
-_BEGIN, _LOAD = 0.003, 0.012  # of any flight, metrics and digest included; of loading and trimming an airframe
+# Seconds on the machine of `make bench`: of any plant per guidance period, per gust, per measurement.
+_PERIOD, _GUST, _SAMPLE = 6e-6, 1e-6, 60e-6
+_BEGIN = 0.003  # of any flight, metrics and digest included
 _FORGETTING = 0.2
 
 
@@ -29,10 +29,8 @@ class Estimate:
 def guess(flight: Flight) -> float:
     """Seconds on a machine like that of `make bench`."""
     seconds, steps = _BEGIN + flight.periods * _PERIOD, flight.duration / flight.step
-    if flight.plant in _RUNGS:
-        seconds += _LOAD + max(flight.periods, flight.duration / 0.05) * _RUNGS[flight.plant]
-    if flight.plant == "sixdof":
-        seconds += _LOAD + steps * _STEP
+    cost = PLANTS[flight.plant].cost
+    seconds += cost.start + max(flight.periods, flight.duration / 0.05) * cost.period + steps * cost.step
     if flight.wind.turbulence != "none":
         seconds += steps * _GUST
     if flight.estimator.kind == "ekf":

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 from harness.flight import Flight
 from harness.key import hashed
-from harness.randomness import stream
 from harness.runs.axis import Axis, Draw, axis, flattened
 from harness.settings import Experiment, SettingsError, SettingsFile, flight_from_document, put
 from harness.settings.toml_locator import Key, nearest_line
+from harness.world.randomness import stream
 
 
 class Combination(NamedTuple):

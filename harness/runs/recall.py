@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import aircraft
 from harness.flight import Flight
-from harness.flight_log import FlightLog
 from harness.key import content_hash, version_of
+from harness.log import FlightLog
+from harness.loop import simulate
 from harness.runs.row import Judged, judged
 from harness.runs.store import Stored, content, find
 from harness.settings import SettingsFile, flight_from_document, overridden
-from harness.simulation import simulate
 
 
 class Place(NamedTuple):

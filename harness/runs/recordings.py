@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from harness.flight_log import FlightLog
+from harness.log import FlightLog
 
 FOLDER = "flights"
 

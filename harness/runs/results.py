@@ -1,22 +1,21 @@
 """The results of a run as one table: a row per flight, a column per setting and metric."""
 
 import json
-import math
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.metrics import MEANING
+from harness.files import whole
+from harness.metric import MEANING
 from harness.runs.store import reading
-from harness.whole import whole
+from harness.settings.columns import by_column
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
 PARQUET = "flights.parquet"
-_LISTS_OF_TABLES = ("segments", "gusts")
 _AT_ONCE = 1000  # rows
 _FIRST = ("key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds")
 _STAND = b"journal_changes"  # in the Parquet file's metadata: how far the journal was
@@ -101,31 +100,18 @@ def _columns(journal: sqlite3.Connection) -> Iterator[dict[str, list[Any]]]:
         "FROM flights ORDER BY position, key"
     )
     while rows := found.fetchmany(_AT_ONCE):
-        flat = [_flat(row) for row in rows]
-        names = dict.fromkeys(name for row in flat for name in row)
-        yield {name: [row.get(name) for row in flat] for name in names}
+        found_rows = [_flat(row) for row in rows]
+        names = dict.fromkeys(name for row in found_rows for name in row)
+        yield {name: [row.get(name) for row in found_rows] for name in names}
 
 
 def _flat(row: tuple[Any, ...]) -> dict[str, Any]:
     *values, run, version, settings, metrics = row
-    flat = dict(zip(_FIRST, values, strict=True))
-    flat.update(run=run, version=version[:8])
-    flat.update(flat_settings(json.loads(settings)))
-    flat.update(json.loads(metrics))
-    return flat
-
-
-def flat_settings(settings: Mapping[str, Any], within: str = "") -> dict[str, Any]:
-    """Every setting by its dotted key. A list of tables is JSON text; infinity, a text in JSON, is a number again."""
-    flat: dict[str, Any] = {}
-    for key, value in settings.items():
-        if isinstance(value, dict):
-            flat.update(flat_settings(value, f"{within}{key}."))
-        elif key in _LISTS_OF_TABLES:
-            flat[within + key] = json.dumps(value)
-        else:
-            flat[within + key] = math.inf if value == "inf" else value
-    return flat
+    columns = dict(zip(_FIRST, values, strict=True))
+    columns.update(run=run, version=version[:8])
+    columns.update(by_column(json.loads(settings)))
+    columns.update(json.loads(metrics))
+    return columns
 
 
 def _frame(table: "pa.Table") -> "pd.DataFrame":

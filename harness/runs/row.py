@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.flight import Flight, feasibility_margin
-from harness.flight_log import COLUMNS, FlightLog
+from harness.feasibility import feasibility_margin
+from harness.flight import Flight
 from harness.key import Identity, identity
-from harness.metrics import MEANING, metrics
-from harness.plant import Outcome, PlantError
-from harness.simulation import simulate
+from harness.log import COLUMNS, FlightLog
+from harness.loop import simulate
+from harness.metric import MEANING, metrics
+from harness.plants.plant import Outcome, PlantError
 
 Row = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from harness.key import Identity, files, identity, version_of
-from harness.plant import Outcome
+from harness.plants.plant import Outcome
+from harness.provenance import provenance
 from harness.runs.estimate import Estimate
 from harness.runs.matrix import Matrix
-from harness.runs.provenance import provenance
 from harness.runs.row import row
 from harness.runs.store import JOURNAL, Store, begun, examples, positions, reading
 from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task

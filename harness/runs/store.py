@@ -12,8 +12,8 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from harness.key import Version, content_hash
-from harness.plant import Outcome
-from harness.runs.provenance import Provenance, now
+from harness.plants.plant import Outcome
+from harness.provenance import Provenance, now
 from harness.runs.row import Judged, Row
 
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"

@@ -5,12 +5,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from harness.cells import number
-from harness.metrics import MEANING
+from harness.metric import MEANING
+from harness.plants.ladder import PLANTS
 from harness.runs.recordings import recording_path
-from harness.runs.results import flat_settings
 from harness.runs.store import Stored
 from harness.settings import document, flight_from_document
+from harness.settings.columns import by_column
+from harness.tables import number
 
 _ENDED = {
     "completed": "It flew to its end.",
@@ -30,7 +31,11 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
     yield f"flight {row['key']}"
     if run["title"]:
         yield f"of {run['title']!r}: {run['question']}"
-    what = settings["plant"] if settings["plant"] == "kinematic" else f"{settings['plant']} {settings['aircraft']}"
+    what = (
+        settings["plant"]
+        if not PLANTS[settings["plant"]].has_airframe
+        else f"{settings['plant']} {settings['aircraft']}"
+    )
     yield (
         f"{law['name']} ({law['gains']}) on {what}, {settings['duration_s']:g} s in {_air(settings['wind'])}, "
         f"seed {settings['seed']}, "
@@ -54,9 +59,9 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
         yield f"  {name:30}{number(value):>9}  {MEANING.get(name, '')}"
     yield ""
     yield "settings that are not the default's:"
-    flat = flat_settings(settings)
-    usual = flat_settings(document(flight_from_document({"plant": settings["plant"], "law": {"name": law["name"]}})))
-    for name, value in flat.items():
+    columns = by_column(settings)
+    usual = by_column(document(flight_from_document({"plant": settings["plant"], "law": {"name": law["name"]}})))
+    for name, value in columns.items():
         if name in ("plant", "law.name") or value != usual.get(name):
             yield f"  {name} = {json.dumps(value)}"
     yield ""

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from harness.cells import METRICS
 from harness.runs.matrix import Matrix
-from harness.runs.results import flat_settings
 from harness.runs.store import reading
+from harness.settings.columns import by_column
+from harness.tables import METRICS
 
 
 class Line(NamedTuple):
@@ -46,10 +46,10 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
             (matrix.identifier,),
         )
         for position, outcome, settings, metrics in rows:
-            flat = flat_settings(json.loads(settings))
+            columns = by_column(json.loads(settings))
             combination = matrix.at(position)
-            flat |= dict.fromkeys(combination.drawn if combination else (), "drawn")
-            labels = tuple(" ".join(_shown(flat.get(key)) for key in together) for together in keys)
+            columns |= dict.fromkeys(combination.drawn if combination else (), "drawn")
+            labels = tuple(" ".join(_shown(columns.get(key)) for key in together) for together in keys)
             if labels not in groups and len(groups) == most:
                 left_out.add(labels)
             else:

@@ -3,8 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from harness.flight import Flight, feasibility_margin, try_start
-from harness.plant import PlantError
+from harness.checks import try_start
+from harness.feasibility import feasibility_margin
+from harness.flight import Flight
+from harness.plants.plant import PlantError
 from harness.runs.estimate import guess
 from harness.runs.matrix import Combination, Matrix
 from harness.settings import SettingsError

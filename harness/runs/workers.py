@@ -25,7 +25,7 @@ from pebble.pool.process import WORKERS_NAME
 
 from harness.flight import Flight
 from harness.key import version_of
-from harness.plant import Outcome
+from harness.plants.plant import Outcome
 from harness.runs.estimate import CHUNK, Estimate
 from harness.runs.row import Judged, failed, flown, judged
 

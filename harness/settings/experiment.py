@@ -12,8 +12,8 @@ from typing import Annotated, Literal
 from autopilot.laws import LAWS
 from autopilot.quantities import About
 from harness.flight import Flight
+from harness.margins import Assess
 from harness.settings.table import Setting, Table, table_of
-from harness.verdict.assess import Assess
 
 CUSTOM = "custom"  # in the place of a named set: every gain is given
 

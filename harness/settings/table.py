@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from functools import cache
 from types import EllipsisType, NoneType, UnionType
-from typing import Annotated, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Literal, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from autopilot.quantities import Unit, Unlimited
+from autopilot.quantities import OneOf, Unit, Unlimited
 from harness.settings.number import in_file
 
 _PLAIN = Unit("", 1.0)
@@ -64,6 +64,9 @@ def _annotated(hint: object) -> Setting:
             if isinstance(mark, Gt | Ge | Lt | Le)
         )
         infinite = setting.infinite or Unlimited() in marks
+        for mark in marks:
+            if isinstance(mark, OneOf):
+                setting = replace(setting, kind=Literal[mark.names])
         return replace(setting, unit=unit, bounds=(*setting.bounds, *bounds), infinite=infinite)
     if get_origin(hint) in (Union, UnionType):
         (inner,) = (member for member in get_args(hint) if member is not NoneType)

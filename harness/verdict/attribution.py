@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from harness.plants.ladder import PLANTS, rung
 from harness.verdict.pairs import REFERENCE, change, ordered, pairs, settings_of, spread
 from harness.verdict.statistics import Effect, effect
 
@@ -26,19 +27,6 @@ METRICS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "command_activity_deg_s2": ("command activity", "deg/s2"),
     }
 )
-LADDER: Mapping[str, str] = MappingProxyType(
-    {
-        "kinematic": "Eq. (1)",
-        "lagged": "lag of the heading rate",
-        "coordinated": "bank and airspeed dynamics",
-        "sixdof": "the rest of 6-DOF",
-    }
-)
-
-
-def rung(plant: str) -> int:
-    """How far up the ladder; a plant that is none of its rungs stands below."""
-    return list(LADDER).index(plant) if plant in LADDER else -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +89,7 @@ def attributions(flights: pd.DataFrame) -> Iterator[Attribution]:
 
 def attribution(flights: pd.DataFrame, name: str, law: str) -> Attribution:
     """Of one airframe's flights under one law."""
-    rungs = tuple(plant for plant in LADDER if plant in set(flights["plant"]))
+    rungs = tuple(plant for plant in PLANTS if plant in set(flights["plant"]))
     on = _same_scenarios(flights, rungs)
     ladders = tuple(_ladder(metric, on) for metric in METRICS) if len(rungs) > 1 and len(on[rungs[0]]) else ()
     steps = tuple(step for disturbance in DISTURBANCES for step in _disturbed(flights, disturbance, rungs))
@@ -147,7 +135,7 @@ def _ladder(metric: str, on: Mapping[str, pd.DataFrame]) -> Ladder:
 
 def _between(below: str, above: str) -> str:
     """What a rung adds to one below it, rungs that were not flown included."""
-    return ", ".join(list(LADDER.values())[rung(below) + 1 : rung(above) + 1])
+    return ", ".join(kind.adds for kind in list(PLANTS.values())[rung(below) + 1 : rung(above) + 1])
 
 
 def _seed_mean(flights: pd.DataFrame, metric: str) -> float:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from harness.metrics import MEANING
-from harness.verdict.assess import Assess
-from harness.verdict.attribution import Attribution, attributions, rung
+from harness.margins import Assess
+from harness.metric import MEANING
+from harness.plants.ladder import BASELINE, rung
+from harness.verdict.attribution import Attribution, attributions
 from harness.verdict.pairs import FAILED, Pairs, axes, change, entered, ordered, plant_pairs, spread, varying
 from harness.verdict.parts import with_quantities
 from harness.verdict.scorecard import Scorecard, scorecards
@@ -67,7 +68,7 @@ class Comparison:
         return [card for card in self.scorecards if card.plant == self.last_plant]
 
 
-def compare(flights: pd.DataFrame, assess: Assess, baseline: str = "kinematic") -> Comparison:
+def compare(flights: pd.DataFrame, assess: Assess, baseline: str = BASELINE) -> Comparison:
     """Of a directory's flights. Raises `CompareError` with what is missing."""
     table = with_quantities(entered(flights, assess.circling_error))
     paired = plant_pairs(table, baseline)

@@ -10,12 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.metrics import MEANING
-from harness.plant import Outcome
+from harness.metric import MEANING
+from harness.plants.plant import Outcome
+from harness.settings.columns import is_setting
 
-RESULTS = ("key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds", "run", "version")
-ENTERED = ("lost", "converged", "circles")  # the columns that `entered` adds
-QUANTITIES = ("airspeed_deviation", "lag_times_k2", "bank_beyond_deg", "lost_share", "converged_share")  # of `parts`
 LOST = (Outcome.GROUND.value, Outcome.DEPARTED.value, Outcome.TARGET_LOST.value)
 FAILED = tuple(outcome.value for outcome in Outcome if outcome.failed)
 OF_A_CIRCLE = frozenset(  # metrics that mean something only where the law circles its target
@@ -59,8 +57,7 @@ class Pairs:
 
 def settings_of(flights: pd.DataFrame) -> list[str]:
     """The columns that are settings."""
-    others = {*RESULTS, *MEANING, *ENTERED, *QUANTITIES}
-    return [column for column in flights.columns if column not in others]
+    return [column for column in flights.columns if is_setting(column)]
 
 
 def varying(flights: pd.DataFrame) -> list[str]:

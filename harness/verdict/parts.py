@@ -9,7 +9,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 import aircraft
-from harness.verdict.assess import Assess
+from harness.margins import Assess
+from harness.plants.ladder import PLANTS
+from harness.plants.turn import banks_of_turns
 from harness.verdict.pairs import Pairs, change
 
 Bounds = tuple[float | None, float | None]
@@ -111,9 +113,10 @@ PARTS: tuple[Part, ...] = (
 def with_quantities(table: pd.DataFrame) -> pd.DataFrame:
     """The entered flights with the columns that the parts need beside the metrics."""
     k2 = table.get("law.k2", np.nan)
-    bank = np.degrees(np.arctan(table["start.airspeed_mps"] * _limit(table) / 9.80665))
+    speeds, limits_of_rate = table["start.airspeed_mps"].to_numpy(float), _limit(table).to_numpy(float)
+    bank = pd.Series(np.degrees(banks_of_turns(speeds, limits_of_rate)), index=table.index)
     limits = {name: _bank_limit_deg(name) for name in set(table["aircraft"])}
-    banked = ~table["plant"].isin(["kinematic", "lagged"])  # these turn without banking
+    banked = table["plant"].map(lambda plant: PLANTS[plant].banks)
     return table.assign(
         airspeed_deviation=table["airspeed_deviation_rms_mps"] / table["start.airspeed_mps"],
         lag_times_k2=table["heading_rate_lag_s"] * k2,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from harness.metrics import MEANING
+from harness.metric import MEANING
 from harness.settings.written import written
 from harness.template import template
 from harness.verdict import figures, words
@@ -18,7 +18,7 @@ from harness.verdict.pairs import axes, change, spread
 from harness.verdict.scorecard import Finding, Scorecard, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
 
-_MAP = Path(__file__).parents[2] / "docs" / "images" / "limit_cycle.svg"  # of `harness.verdict.limit_cycle`
+_MAP = Path(__file__).parents[2] / "docs" / "images" / "limit_cycle.svg"  # of `harness.studies.limit_cycle`
 MOST_FLIGHTS = 60  # pairs listed on a page
 MOST_DRAWN = 12  # airframes and laws whose attribution is drawn: the page stays below 3 MB
 

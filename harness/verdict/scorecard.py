@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.verdict.assess import Assess
+from harness.margins import Assess
 from harness.verdict.pairs import REFERENCE, Pairs, axes, is_ordered, joined, spread
 from harness.verdict.parts import PARTS, Part
 from harness.verdict.statistics import Effect, Share, effect, equivalence, holm, mcnemar, share

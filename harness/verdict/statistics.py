@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from harness.randomness import stream
+from harness.world.randomness import stream
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from harness.cells import number
+from harness.tables import number
 from harness.verdict.comparison import Comparison, Left, Row
 from harness.verdict.pairs import REFERENCE
 from harness.verdict.scorecard import HOLDS, IF, NOT, UNMEASURED, UNSHOWN, Cell, Finding, Scorecard, shown

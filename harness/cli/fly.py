@@ -1,0 +1,134 @@
+"""`harness fly`: one flight, of a file or of a row."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from harness.review.live import Live
+    from harness.runs.recall import Place, Recalled
+    from harness.runs.row import Judged
+
+
+@click.command()
+@click.argument("what", metavar="FILE|DIR:KEY")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
+@click.option("--rrd", type=click.Path(path_type=Path), help="Write a Rerun recording there.")
+@click.option("--live", is_flag=True, help="Stream to an open viewer (`harness view`) while flying.")
+@click.option("--pace", type=click.FloatRange(0, min_open=True), help="Times real time, with --live.  [default: 1]")
+@click.option("--port", type=click.IntRange(1, 65535), help="Where the viewer listens, with --live.  [default: 9876]")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout instead of the table.")
+def fly(
+    what: str,
+    overrides: tuple[str, ...],
+    rrd: Path | None,
+    live: bool,
+    pace: float | None,
+    port: int | None,
+    as_json: bool,
+) -> None:
+    """Fly the flight that FILE describes, or again a row of a run, and print its metrics.
+
+    A row without --set is compared with what is stored. The beginning of its key is enough.
+
+    \b
+    Examples:
+      harness fly experiments/stationary.toml --rrd flight.rrd
+      harness fly experiments/stationary.toml --set plant=kinematic --set law.name=smc --set law.gains=paper --json
+      harness fly experiments/stationary.toml --live --pace 10
+      harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0]
+    """
+    import json
+
+    from harness.cli._input import BadInput, flight_of, read_file, typed, writable
+    from harness.feasibility import feasibility_line, warnings
+    from harness.key import identity
+    from harness.loop import simulate
+    from harness.metric import MEANING
+    from harness.runs.recall import place_of
+    from harness.runs.row import judged, row
+    from harness.tables import number
+
+    if not live and (pace is not None or port is not None):
+        raise BadInput("--pace and --port are of --live: add it")
+    place = place_of(what)
+    if not place and Path(what).is_dir():
+        raise BadInput(f"{what}: is a directory; a flight of it is {what}:KEY, by `harness show {what}`")
+    recalled = _recalled(place) if place else None
+    settings = recalled.file(what, overrides) if recalled else read_file(Path(what), overrides)
+    flight = flight_of(settings)
+    if rrd is not None:
+        writable(rrd)
+    stream = _stream(flight.plant, Path(what).stem, pace, port) if live else None
+    click.echo(feasibility_line(flight), err=as_json)
+    for warning in warnings(flight):
+        click.echo(f"warning: {warning}", err=True)
+    log = simulate(flight, stream)
+    if stream:
+        stream.finish(log, typed())
+        if stream.gone:
+            click.echo("warning: the viewer was closed during the flight", err=True)
+    how = judged(log)
+    result = row(flight, identity(flight), how)
+    if recalled and not overrides:
+        result.update(key=recalled.stored.row["key"], flight=recalled.stored.row["flight"])
+        _compare(recalled, how)
+    if rrd is not None:
+        from harness.review.recording import write_recording
+
+        write_recording(rrd, {flight.plant: log}, Path(what).stem, command=typed())
+    if as_json:
+        click.echo(json.dumps(result, allow_nan=False))
+    else:
+        _tell(result, {name: (number(value), MEANING[name]) for name, value in result["metrics"].items()})
+    raise SystemExit(1 if log.outcome.failed else 0)
+
+
+def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live:
+    """To the viewer that is open. At once an error when there is none."""
+    from harness.cli._input import BadInput
+    from harness.review.live import Live
+    from harness.review.viewer import PORT, ViewerError
+
+    try:
+        return Live(name, title, pace or 1.0, port or PORT)
+    except ViewerError as error:
+        raise BadInput(str(error)) from None
+
+
+def _recalled(place: Place) -> Recalled:
+    from harness.cli._input import BadInput
+    from harness.runs.recall import recall
+    from harness.runs.store import StoreError
+
+    try:
+        return recall(place)
+    except StoreError as error:
+        raise BadInput(str(error)) from None
+
+
+def _compare(recalled: Recalled, how: Judged) -> None:
+    """Says whether the flight is the stored one, to the last bit."""
+    from harness.runs.recall import deviation
+
+    if not recalled.digest:
+        click.echo(f"the row has no digest to compare with: it ended in {recalled.stored.row['outcome']}", err=True)
+    elif apart := deviation(recalled.stored, how):
+        why = (
+            f"changed since: {', '.join(recalled.changed)}" if recalled.changed else "though nothing known has changed"
+        )
+        click.echo(f"warning: not the flight that is stored ({why}): {apart}", err=True)
+    else:
+        click.echo("the same flight as stored, to the last bit", err=True)
+
+
+def _tell(result: Mapping[str, object], rows: dict[str, tuple[str, str]]) -> None:
+    for name, (value, meaning) in rows.items():
+        click.echo(f"  {name:30}{value:>9}  {click.style(meaning, dim=True)}")
+    reason = f": {result['reason']}" if result["reason"] else ""
+    click.echo(f"{result['outcome']}{reason}")
+    click.echo(f"key {result['key']}  digest {result['digest']}")

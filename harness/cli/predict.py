@@ -1,0 +1,62 @@
+"""`harness predict`: the limit cycle of a law behind an airframe's inner loop."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
+def predict(file: Path, overrides: tuple[str, ...]) -> None:
+    """Predict, without flying, the limit cycle of the flight that FILE describes, on its circle in still air.
+
+    And what would end it: how quick the inner loop has to be for these gains, and how high the gains may be for it.
+
+    \b
+    Example:
+      harness predict experiments/stationary.toml --set aircraft=skywalker_x8
+    """
+    import math
+    from dataclasses import replace
+
+    from autopilot.nftsm import Nftsm
+    from harness.checks import airframe_of
+    from harness.cli._input import BadInput, flight_of, read_file
+    from harness.limit_cycle.prediction import Loop, boundary, critical_gain, limit_cycle
+    from harness.plants.identified import IdentifiedError, identified
+
+    settings = read_file(file, overrides)
+    flight = flight_of(settings)
+    try:
+        one = identified(airframe_of(flight.aircraft), flight.start.airspeed)
+    except IdentifiedError as error:
+        raise BadInput(f"{settings.locate('start.airspeed')}: {error}") from None
+    law = flight.law
+    loop = Loop(law, one.heading_rate, flight.start.airspeed, flight.guidance_period)
+    try:
+        cycle = limit_cycle(loop)
+    except ValueError as error:
+        raise BadInput(f"{settings.locate('law.max_heading_rate')}: {error}") from None
+    bandwidth = loop.response.bandwidth
+    click.echo(
+        f"{flight.aircraft} at {flight.start.airspeed:g} m/s: bandwidth {bandwidth:.3g} rad/s, "
+        f"critical gain {critical_gain(loop.response, loop.period)[0]:.3g} 1/s with a command held {loop.period:g} s"
+    )
+    if cycle is None:
+        click.echo("no limit cycle: the command swings by less than 0.5 deg/s")
+    else:
+        click.echo(
+            f"limit cycle: {cycle.frequency:.3g} Hz, heading rate +-{math.degrees(cycle.heading_rate):.3g} deg/s, "
+            f"command +-{math.degrees(cycle.command):.3g} deg/s, range error "
+            f"{cycle.range_mean:.3g} +-{cycle.range_error:.3g} m"
+        )
+    if isinstance(law, Nftsm):
+        quicker = boundary(lambda q: replace(loop, response=loop.response.quicker(q)), 4.0)
+        gains = boundary(lambda q: replace(loop, law=replace(law, k2=q * law.k2, k3=q * law.k3)), 0.3)
+        if math.isfinite(quicker):
+            click.echo(
+                f"border for these gains: an inner loop {quicker:.3g} times as quick, {quicker * bandwidth:.3g} rad/s"
+            )
+        if math.isfinite(gains):
+            click.echo(f"border for this inner loop: k2 = {gains * law.k2:.3g}, k3 = {gains * law.k3:.3g} 1/s")

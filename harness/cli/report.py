@@ -1,0 +1,37 @@
+"""`harness report`: a comparison as a page."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="The page. [default: DIR/report.html]")
+@click.option("--markdown", type=click.Path(path_type=Path), help="Write this instead: the same without figures.")
+@click.option("--baseline", default="kinematic", show_default=True, help="The plant that the others are compared with.")
+@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Another margin; repeatable.")
+def report(directory: Path, out: Path | None, markdown: Path | None, baseline: str, overrides: tuple[str, ...]) -> None:
+    """What `harness compare DIR` says as one page with figures that fetches nothing: for a browser, and for paper.
+
+    \b
+    Examples:
+      harness report out/wind
+      harness report out/assumption --markdown docs/results.md
+    """
+    from harness.cli._comparison import read_comparison
+    from harness.cli._input import BadInput, busy, writable
+    from harness.files import whole
+    from harness.verdict import report as job
+
+    if out is not None and markdown is not None:
+        raise BadInput("--out and --markdown are one file each: give one of them")
+    if not directory.is_dir():
+        raise BadInput(f"{directory}: there is no such directory")
+    path = writable(markdown or out or directory / "report.html")
+    with busy("comparing and drawing"):
+        comparison, origin = read_comparison(directory, baseline, overrides)
+        text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
+        with whole(path) as partial:
+            partial.write_text(text, encoding="utf-8")
+    click.echo(f"{path}")

@@ -1,0 +1,80 @@
+"""Can the circle be held? The heading rate that holding it takes, against the limit; and what to know beforehand."""
+
+import math
+
+import aircraft
+from autopilot.standoff import holding_course_rate
+from harness.flight import Flight, setup_of
+from harness.plants.ladder import PLANTS
+from harness.plants.turn import bank_of_turn
+from harness.world.target import TargetState
+
+
+def target_states(flight: Flight) -> list[TargetState]:
+    """The target during the flight, at its breakpoints and twice a second."""
+    at = flight.target.start()
+    if flight.target.track is None and not flight.target.speed and not flight.target.segments:
+        return [at(0.0)]  # at rest
+    times = {*flight.target.breakpoints(), *(0.5 * k for k in range(int(2 * flight.duration) + 1))}
+    return [at(t) for t in times if 0.0 <= t <= flight.duration]
+
+
+def relative_speed(flight: Flight) -> float:
+    """The largest |wind - target velocity| of the flight, m/s, at the target's breakpoints and twice a second."""
+    W_x, W_y = flight.wind.steady
+    return max(math.hypot(W_x - s.target_velocity_north, W_y - s.target_velocity_east) for s in target_states(flight))
+
+
+def needed_rate(flight: Flight) -> float:
+    """The largest rate that holding the circle takes of what the law limits, rad/s.
+
+    Heading rate: (v_a + w)^2 / (v_a R_d). Course rate, which a tail wind raises less: (v_a + w) / R_d at rest.
+    """
+    v_a = flight.start.airspeed
+    if flight.law.command == "course_rate":
+        velocities = {(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight)}
+        return max(holding_course_rate(flight.law.standoff, v_a, *flight.wind.steady, *v) for v in velocities)
+    return (v_a + relative_speed(flight)) ** 2 / (v_a * flight.law.standoff)
+
+
+def feasibility_margin(flight: Flight) -> float:
+    """The limit minus what holding the circle takes, rad/s; negative: the circle cannot be held."""
+    return flight.law.max_heading_rate - needed_rate(flight)
+
+
+def feasibility_line(flight: Flight) -> str:
+    """Whether the circle can be held, and by what margin."""
+    margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
+    of = " of course" if flight.law.command == "course_rate" else ""
+    verdict = "feasible" if margin >= 0 else "INFEASIBLE"
+    return (
+        f"circle {verdict}: holding it takes up to {needed:.2f} deg/s{of}, "
+        f"the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s (margin {margin:+.2f})"
+    )
+
+
+def warnings(flight: Flight) -> list[str]:
+    """What the user should know before trusting the flight; it is flown all the same."""
+    said = []
+    v_a = flight.start.airspeed
+    fastest = max(math.hypot(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight))
+    ratio = (fastest + math.hypot(*flight.wind.steady)) / v_a
+    if ratio >= 1.0:
+        said.append(f"Remark 1 asks for v_t + v_w < v_a; here it is {ratio * v_a:.3g} m/s of {v_a:g} m/s")
+    if feasibility_margin(flight) < 0:
+        said.append("the circle is infeasible: the limit is below what holding it takes")
+    plant = PLANTS[flight.plant]
+    setup = setup_of(flight)
+    said += plant.warnings(setup)
+    if plant.banks:
+        limits = aircraft.limits(setup.airframe)
+        if not limits.slowest <= v_a <= limits.fastest:
+            envelope = f"{limits.slowest:g} to {limits.fastest:g} m/s"
+            said.append(f"{v_a:g} m/s is outside the airframe's envelope, {envelope}")
+        needed = bank_of_turn(v_a, flight.law.max_heading_rate)
+        if needed > limits.bank:
+            said.append(
+                f"the heading-rate limit takes {math.degrees(needed):.0f} deg of bank, the inner loop allows "
+                f"{math.degrees(limits.bank):.0f}"
+            )
+    return said + flight.law.broken_conditions(ratio)

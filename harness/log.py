@@ -1,0 +1,61 @@
+"""What a flight leaves behind."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.estimator import Estimate, Measurement
+from autopilot.guidance import Guidance
+from harness.flight import Flight
+from harness.plants.plant import Outcome
+from harness.plants.state import State
+from harness.world.target import TargetState
+
+# The loop writes the first columns, row by row; the rest follows from the flight as a whole.
+GUIDANCE_COLUMNS = ("heading_rate_command", "range_error_seen", *Guidance._fields[2:])  # from what the law knew
+LOOP_COLUMNS = ("time", *State._fields, *TargetState._fields, *GUIDANCE_COLUMNS)
+# The target as the law knew it: the truth itself, with variances of NaN, where nothing is estimated. An innovation is
+# NaN but in the rows with a new measurement; of several since the row before, it is the latest's.
+SEEN_COLUMNS = (
+    *(f"{name}_seen" for name in Estimate._fields[:4]),
+    *Estimate._fields[4:],
+    *(f"innovation_{name}" for name in Measurement._fields),
+)
+COLUMNS = (*LOOP_COLUMNS, "range_error", *SEEN_COLUMNS)  # the range error is the true one
+# What the digest is made of: how aircraft and target moved, and the command between them. Named one by one, so that a
+# column added to the log changes no digest.
+TRAJECTORY = (
+    "north", "east", "altitude", "velocity_north", "velocity_east", "velocity_down", "airspeed", "heading",
+    "heading_rate", "bank", "roll_rate", "pitch", "yaw", "pitch_rate", "yaw_rate", "aileron", "elevator", "rudder",
+    "throttle", "target_north", "target_east", "target_velocity_north", "target_velocity_east",
+    "target_acceleration", "target_turn_rate", "heading_rate_command",
+)  # fmt: skip
+_TRAJECTORY = [COLUMNS.index(name) for name in TRAJECTORY]
+_ROWS_AT_ONCE = 128
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLog:
+    """A flight and what happened, one row per guidance period. SI, rad; `log["range_error"]` is a column."""
+
+    flight: Flight
+    outcome: Outcome
+    reason: str  # why it ended early, or empty
+    table: NDArray[np.float64]  # (rows, len(COLUMNS))
+
+    def __getitem__(self, column: str) -> NDArray[np.float64]:
+        return self.table[:, COLUMNS.index(column)]
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    @property
+    def digest(self) -> str:
+        """A hash of `TRAJECTORY` to the last bit, and of the outcome. Processors have SHA-256 built in."""
+        content = hashlib.sha256(repr((TRAJECTORY, self.outcome.value)).encode())
+        for begin in range(0, len(self.table), _ROWS_AT_ONCE):  # so few that they stay in the processor's cache
+            rows = self.table[begin : begin + _ROWS_AT_ONCE, _TRAJECTORY]
+            content.update(np.ascontiguousarray(rows + 0.0).data)  # + 0.0: minus zero is zero
+        return content.hexdigest()[:32]

@@ -1,0 +1,156 @@
+"""The plants, each adding one thing to the one before it: the ladder from Eq. (1) to six degrees of freedom.
+
+A plant is one file beside this one, and one entry here. Nothing else asks for its name.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+import aircraft
+import autopilot
+from harness.plants.kinematic import Kinematic
+from harness.plants.plant import Plant
+
+_FOLDER = Path(__file__).parent
+
+
+class Setup(NamedTuple):
+    """What a plant is made from."""
+
+    airframe: Path  # the airframe's folder
+    airspeed: float  # nominal, m/s
+    step: float  # of the 6-DOF simulation, s
+    rate_trim: bool  # of the inner loop
+
+
+class Cost(NamedTuple):
+    """Processor time, s, that a flight takes beyond the guidance loop, on the machine of `make bench`."""
+
+    start: float = 0.0  # once
+    period: float = 0.0  # per guidance period, or per 50 ms of a longer one
+    step: float = 0.0  # per simulation step
+
+
+def _nothing(setup: Setup) -> list[str]:
+    return []
+
+
+def _no_files(airframe: Path) -> Mapping[str, Path]:
+    return {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantKind:
+    """A plant as it is declared. Its place in `PLANTS` is its rung."""
+
+    about: str  # one sentence
+    adds: str  # what it adds to the rung below, in a few words
+    make: Callable[[Setup], Plant]  # raises `PlantError`
+    banks: bool = False  # it turns by banking, so it has a bank limit and an airspeed envelope
+    files: Callable[[Path], Mapping[str, Path]] = _no_files  # of an airframe: what decides its flights, by name
+    libraries: tuple[str, ...] = ()  # distributions that decide its flights
+    cost: Cost = Cost()
+    warnings: Callable[[Setup], list[str]] = _nothing  # what a user should know before trusting a flight
+
+    @property
+    def has_airframe(self) -> bool:
+        """Whether the airframe decides how it flies."""
+        return self.files is not _no_files
+
+
+def _kinematic(setup: Setup) -> Plant:
+    return Kinematic()
+
+
+def _lagged(setup: Setup) -> Plant:
+    from harness.plants.identified import identified  # SciPy is loaded by those who fly by it
+
+    return identified(setup.airframe, setup.airspeed).lagged
+
+
+def _coordinated(setup: Setup) -> Plant:
+    from harness.plants.identified import identified
+
+    return identified(setup.airframe, setup.airspeed).coordinated
+
+
+def _sixdof(setup: Setup) -> Plant:
+    from harness.plants.sixdof import SixDof  # JSBSim is loaded by those who fly it
+
+    return SixDof(setup.airframe, setup.step, setup.rate_trim)
+
+
+def _airframe_files(airframe: Path) -> dict[str, Path]:
+    names = ("airframe.toml", "inner_loop.toml")
+    return {"aircraft/model": aircraft.model(airframe), **{f"aircraft/{name}": airframe / name for name in names}}
+
+
+def _identified_files(airframe: Path) -> Mapping[str, Path]:
+    identification = aircraft.identified(airframe)
+    return {**_airframe_files(airframe), f"aircraft/{identification.name}": identification}
+
+
+def _sixdof_files(airframe: Path) -> Mapping[str, Path]:
+    return {
+        "autopilot/inner_loop.xml": Path(autopilot.__file__).parent / "inner_loop.xml",
+        "harness/plants/planet.xml": _FOLDER / "planet.xml",
+        **_airframe_files(airframe),
+    }
+
+
+def _identification_warnings(setup: Setup) -> list[str]:
+    from harness.plants.identified import called, is_stale
+
+    warnings = []
+    if is_stale(setup.airframe):
+        again = f"run harness identify {called(setup.airframe)}"
+        warnings.append(f"{setup.airframe.name} has changed since it was identified: {again}")
+    if not setup.rate_trim:
+        warnings.append("rate_trim = false changes the 6-DOF plant only: this plant has no shortfall to leave")
+    return warnings
+
+
+PLANTS: Mapping[str, PlantKind] = MappingProxyType(
+    {
+        "kinematic": PlantKind(
+            about="The paper's plant, Eq. (1): constant airspeed, level, the commanded heading rate followed at once.",
+            adds="Eq. (1)",
+            make=_kinematic,
+        ),
+        "lagged": PlantKind(
+            about="The heading rate follows its command with the lag of the airframe's inner loop, gain one.",
+            adds="lag of the heading rate",
+            make=_lagged,
+            files=_identified_files,
+            cost=Cost(start=0.012, period=20e-6),
+            warnings=_identification_warnings,
+        ),
+        "coordinated": PlantKind(
+            about="Bank and airspeed have dynamics and limits of their own, and the turn is coordinated.",
+            adds="bank and airspeed dynamics",
+            make=_coordinated,
+            banks=True,
+            files=_identified_files,
+            cost=Cost(start=0.012, period=45e-6),
+            warnings=_identification_warnings,
+        ),
+        "sixdof": PlantKind(
+            about="A JSBSim airframe with six degrees of freedom under its native inner loop.",
+            adds="the rest of 6-DOF",
+            make=_sixdof,
+            banks=True,
+            files=_sixdof_files,
+            libraries=("jsbsim",),
+            cost=Cost(start=0.012, step=6.5e-6),
+        ),
+    }
+)
+BASELINE = next(iter(PLANTS))  # the lowest rung: what the paper assumes
+
+
+def rung(plant: str) -> int:
+    """How far up the ladder, from 0; -1 for a plant that is none of its rungs."""
+    return list(PLANTS).index(plant) if plant in PLANTS else -1

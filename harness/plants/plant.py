@@ -1,0 +1,73 @@
+"""A plant: everything below the heading-rate command."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, Protocol
+
+from annotated_types import Ge
+
+from autopilot.quantities import About, Degrees, Metres, MetresPerSecond
+from harness.plants.state import State
+from harness.world.air import Air
+
+
+class Outcome(StrEnum):
+    """How a flight ended. The first four are results, the rest are failures."""
+
+    COMPLETED = "completed"
+    GROUND = "ground"
+    DEPARTED = "departed"
+    TARGET_LOST = "target_lost"
+    INVALID = "invalid"
+    TIMEOUT = "timeout"
+    WORKER_DIED = "worker_died"
+
+    @property
+    def failed(self) -> bool:
+        return self in (Outcome.INVALID, Outcome.TIMEOUT, Outcome.WORKER_DIED)
+
+
+class End(Exception):  # noqa: N818 - an end is not an error
+    """The flight cannot go on: raised by a plant, caught by `simulate`, told in the log."""
+
+    def __init__(self, outcome: Outcome, reason: str) -> None:
+        super().__init__(reason)
+        self.outcome = outcome
+
+
+class PlantError(ValueError):
+    """The plant cannot be started with these settings; `key` is the one to change."""
+
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(message)
+        self.key = key
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """Where and how a flight starts: level, in trim, at its nominal airspeed."""
+
+    position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (-200.0, 200.0)
+    heading: Annotated[Degrees, About("direction of the air velocity, clockwise from north")] = math.radians(30.0)
+    airspeed: Annotated[MetresPerSecond, Ge(0.1), About("nominal airspeed, held throughout")] = 13.0
+    altitude: Annotated[Metres, About("above the ground, held throughout")] = 150.0
+
+
+class Flying(Protocol):
+    """A plant in flight."""
+
+    @property
+    def state(self) -> State: ...
+
+    def advance(self, heading_rate: float, period: float) -> None:
+        """Fly on for `period` seconds with this heading-rate command (rad/s) held. Raises `End` when it cannot."""
+        ...
+
+
+class Plant(Protocol):
+    """A model of the aircraft with its inner loop: a frozen value."""
+
+    def start(self, start: Start, air: Air) -> Flying:
+        """The aircraft at `start` in this air. Raises `PlantError` when it cannot fly so."""
+        ...

@@ -1,0 +1,29 @@
+"""The settings of flights as columns of a table: which column is a setting, by the declaration of a flight."""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from harness.flight import Flight
+from harness.settings.table import table_of
+
+_LISTS_OF_TABLES = ("segments", "gusts")
+
+
+def is_setting(column: str) -> bool:
+    """Whether a column of results is a setting: a key, or below a table, of [flight]. Everything else is a result."""
+    return column.partition(".")[0] in table_of(Flight).settings
+
+
+def by_column(settings: Mapping[str, Any], within: str = "") -> dict[str, Any]:
+    """Every setting by its dotted key. A list of tables is JSON text; infinity, a text in JSON, is a number again."""
+    columns: dict[str, Any] = {}
+    for key, value in settings.items():
+        if isinstance(value, dict):
+            columns.update(by_column(value, f"{within}{key}."))
+        elif key in _LISTS_OF_TABLES:
+            columns[within + key] = json.dumps(value)
+        else:
+            columns[within + key] = math.inf if value == "inf" else value
+    return columns

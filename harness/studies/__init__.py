@@ -1,0 +1,1 @@
+"""Studies: each a client of the harness, one command and one page."""

@@ -1,0 +1,232 @@
+"""The columns of the ledgers: on which aircraft, and in what condition, the paper's experiments are flown."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+from autopilot.guidance import Law
+from autopilot.laws import LAWS as KINDS
+from autopilot.nftsm import Nftsm
+from autopilot.smc import Smc
+from harness.flight import Flight
+from harness.loop import simulate
+from harness.metric import metrics
+from harness.plants.plant import Outcome
+from harness.plants.turn import bank_of_turn
+from harness.studies.paper.experiments import EKF, LAWS, Reading, Trace, ending, flight, flown
+
+PAPERS_AIRSPEED = 13.0  # m/s, Table 1
+HELD = 0.05  # s, for which a command is held on an airframe unless a claim is about that time
+
+_STEP = 0.005  # s
+_LONG = tuple(0.5 * n for n in range(2, 41))
+EVERY_PERIOD = (*(n * _STEP for n in range(1, 101)), *_LONG)  # s, tried by claims about sampling
+SOME_PERIODS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
+
+
+class EndedEarlyError(Exception):
+    """A flight ended before its time: on the ground, departed."""
+
+
+class Column(NamedTuple):
+    """What flies the claims' experiments: a column of a ledger.
+
+    Claims speak in the paper's size. An aircraft of another airspeed flies the similar experiment, all its lengths and
+    speeds larger by `scale` and its times and rates the same, and what it flew is told in the paper's size again.
+    """
+
+    name: str
+    about: str
+    change: Callable[[Flight], Flight]  # of the paper's flight, in the paper's size
+    tolerance: float  # m: nearer than this counts as converged
+    aircraft: str = ""  # the airframe on the 6-DOF plant; without one the kinematic aircraft
+    scale: float = 1.0
+    period: float | None = None  # s, for which a command is held; None: as the experiment's reading has it
+    periods: tuple[float, ...] = EVERY_PERIOD  # s, tried by claims about sampling
+
+    def real(self, one: Flight) -> Flight:
+        """The flight as it is flown here."""
+        one = scaled(self.change(one), self.scale)
+        return replace(one, plant="sixdof", aircraft=self.aircraft) if self.aircraft else one
+
+    def held(self, one: Flight) -> Flight:
+        """The flight with its command held as long as it is here."""
+        return one if self.period is None else replace(one, guidance_period=self.period, step=_STEP)
+
+    def sampled(self, one: Flight) -> Trace:
+        """That flight here, its command held as long as it says. Raises `EndedEarlyError`."""
+        trace = flown(self.real(one))
+        if trace.ended:
+            raise early(one, trace.ended)
+        return trace if self.scale == 1.0 else _in_papers_size(trace, self.change(one), self.scale)
+
+    def measured(self, one: Flight) -> dict[str, float | None]:
+        """The metrics of that flight here, airspeeds in the paper's size. Raises `EndedEarlyError`."""
+        log = simulate(self.real(self.held(one)))
+        if log.outcome is not Outcome.COMPLETED:
+            raise early(one, ending(log))
+        found = metrics(log)
+        off = found["airspeed_deviation_rms_mps"]
+        return {**found, "airspeed_deviation_rms_mps": None if off is None else off / self.scale}
+
+    def fly(self, one: Flight) -> Trace:
+        """That flight here. Raises `EndedEarlyError`."""
+        return self.sampled(self.held(one))
+
+    def paper(self, experiment: str, law: str, reading: Reading | None = None, duration: float | None = None) -> Trace:
+        """An experiment of the paper's here, under its reading unless told another. Raises `EndedEarlyError`."""
+        return self.fly(flight(experiment, law, reading, duration))
+
+    @property
+    def limit(self) -> float:
+        """What the paper's 5 deg/s are here, deg/s."""
+        return math.degrees(self.change(flight("30", "NFTSM")).law.max_heading_rate)
+
+    @property
+    def limited(self) -> str:
+        """The same in words."""
+        return f"{self.limit:.3g} deg/s"
+
+
+def early(one: Flight, how: str) -> EndedEarlyError:
+    """What to raise when this flight ended so."""
+    return EndedEarlyError(f"the flight of {label(one.law)} over {one.duration:g} s ended: {how}")
+
+
+def label(law: Law) -> str:
+    """The law's name in the ledger."""
+    assert isinstance(law, Nftsm | Smc)
+    return next(
+        name for name, (kind, gains) in LAWS.items() if isinstance(law, KINDS[kind].value) and law.gains == gains
+    )
+
+
+_LENGTHS = ("north", "east", "range_error", "target_north", "target_east", "target_velocity_north",
+            "target_velocity_east")  # fmt: skip
+
+
+def scaled(one: Flight, scale: float) -> Flight:
+    """The similar flight: lengths and speeds times `scale`, times and rates as they are; gains in 1/m over it."""
+    if scale == 1.0:
+        return one
+    law, start, target = one.law, one.start, one.target
+    if isinstance(law, Nftsm):
+        law = replace(law, standoff=scale * law.standoff, k1=law.k1 / scale)
+    elif isinstance(law, Smc):
+        law = replace(law, standoff=scale * law.standoff, c2=law.c2 / scale)
+    return replace(
+        one,
+        law=law,
+        start=replace(start, position=_times(scale, start.position), airspeed=scale * start.airspeed),
+        target=replace(
+            target,
+            position=_times(scale, target.position),
+            speed=scale * target.speed,
+            segments=tuple(replace(each, acceleration=scale * each.acceleration) for each in target.segments),
+        ),
+        wind=replace(one.wind, steady=_times(scale, one.wind.steady)),
+    )
+
+
+def _times(scale: float, vector: tuple[float, float]) -> tuple[float, float]:
+    return (scale * vector[0], scale * vector[1])
+
+
+def _in_papers_size(trace: Trace, one: Flight, scale: float) -> Trace:
+    columns = {name: x / scale if name in _LENGTHS else x for name, x in trace.columns.items()}
+    return Trace(one, columns, trace.ended)
+
+
+def _same(one: Flight) -> Flight:
+    return one
+
+
+def _estimating(one: Flight) -> Flight:
+    return replace(one, estimator=EKF)
+
+
+def _windy(one: Flight) -> Flight:
+    return one if any(one.wind.steady) else replace(one, wind=replace(one.wind, steady=(2.0, 0.0)))
+
+
+def _turbulent(one: Flight) -> Flight:
+    return replace(one, wind=replace(one.wind, turbulence="moderate"))
+
+
+def _steep(one: Flight, limit: float, standoff: float | None = None) -> Flight:
+    """The limit, where there is one, raised to this one, rad/s; and another circle, m."""
+    law = one.law
+    assert isinstance(law, Nftsm | Smc)
+    if not math.isinf(law.max_heading_rate):
+        law = replace(law, max_heading_rate=limit)
+    return replace(one, law=replace(law, standoff=standoff or law.standoff))
+
+
+# The paper's aircraft, as the paper has it.
+COLUMNS = (
+    Column("kinematic, truth", "the paper's aircraft, Eq. (1), each experiment under its one reading", _same, 1e-4),
+    Column("kinematic, EKF", "the same, the law seeing the target through the EKF with the paper's noise, seed 0",
+           _estimating, 1.0),
+)  # fmt: skip
+
+
+class Aircraft(NamedTuple):
+    """What flies in the ledger of the airframes."""
+
+    name: str
+    airspeed: float  # m/s
+    steep: float  # rad/s, of a coordinated turn at 45 deg of bank
+
+
+def _circling(airspeed: float) -> float:
+    """The bank, deg, on a circle that is 60 m in the paper's size."""
+    return math.degrees(bank_of_turn(airspeed, PAPERS_AIRSPEED / 60.0))
+
+
+BASELINE = Aircraft("kinematic", PAPERS_AIRSPEED, math.radians(43.0))
+AIRFRAMES = (
+    Aircraft("ultra_stick_25e", PAPERS_AIRSPEED, math.radians(43.0)),
+    Aircraft("skywalker_x8", PAPERS_AIRSPEED, math.radians(43.0)),
+    Aircraft("aerosonde", 25.0, math.radians(22.5)),
+)
+CONDITIONS = {
+    "still air": "the paper's experiments as they are; the law knows the target as in the experiment's reading",
+    "wind": "a steady 2 m/s of 13 towards north; an experiment with a wind of its own keeps it",
+    "turbulence": "moderate, MIL-F-8785C, not made similar: the same air for all; seed 0, one draw",
+    "EKF": "still air, the law seeing the target through the EKF with the paper's noise, not made similar; seed 0",
+    "45° of bank": "limits of 5 and 10 deg/s raised to a coordinated turn at 45°: 43 deg/s at 13 m/s, 22.5 at 25",
+    "45° at 60 m": "the same on a circle of 60 m, which takes a bank to hold too, round a target at rest "
+    f"{_circling(PAPERS_AIRSPEED):.0f}° at 13 m/s and {_circling(25.0):.0f}° at 25 m/s",
+}
+
+
+def _change(condition: str, limit: float) -> Callable[[Flight], Flight]:
+    changes: dict[str, Callable[[Flight], Flight]] = {
+        "still air": _same,
+        "wind": _windy,
+        "turbulence": _turbulent,
+        "EKF": _estimating,
+        "45° of bank": partial(_steep, limit=limit),
+        "45° at 60 m": partial(_steep, limit=limit, standoff=60.0),
+    }
+    return changes[condition]
+
+
+def column(condition: str, aircraft: Aircraft) -> Column:
+    """An aircraft in a condition."""
+    return Column(
+        f"{condition}, {aircraft.name}",
+        CONDITIONS[condition],
+        _change(condition, aircraft.steep),
+        1.0,
+        aircraft="" if aircraft == BASELINE else aircraft.name,
+        scale=aircraft.airspeed / PAPERS_AIRSPEED,
+        period=HELD,
+        periods=SOME_PERIODS,
+    )
+
+
+# Every aircraft in every condition: the ledger of the airframes, and its kinematic baseline.
+GRID = tuple(column(condition, each) for condition in CONDITIONS for each in (BASELINE, *AIRFRAMES))

@@ -1,0 +1,65 @@
+"""The wind of a flight as it is set."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Le
+
+from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre, Seconds
+from harness.world.air import Air, Array
+
+_Gusty = Annotated[MetresPerSecond, Ge(-100), Le(100)]
+
+
+LOWEST, HIGHEST = 3.048, 304.8  # m, 10 and 1000 ft above ground: where the turbulence's low-altitude model holds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gust:
+    """A discrete gust: it swells and dies away as (1 - cos)/2."""
+
+    from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
+    to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
+    velocity: Annotated[tuple[_Gusty, _Gusty, _Gusty], About("at its height: the air moves towards north, east, down")]
+
+    def at(self, time: Array) -> Array:
+        """The gust at these times, s; (times, 3), m/s."""
+        share = np.clip((time - self.from_) / (self.to - self.from_), 0.0, 1.0)
+        return np.outer(0.5 - 0.5 * np.cos(2.0 * np.pi * share), self.velocity)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wind:
+    """The wind of a flight. A velocity is that of the air: towards."""
+
+    steady: Annotated[
+        tuple[MetresPerSecond, MetresPerSecond], About("steady wind: the air moves towards north, east")
+    ] = (0.0, 0.0)
+    shear: Annotated[
+        tuple[MetresPerSecondPerMetre, MetresPerSecondPerMetre],
+        About("what a metre above the start's altitude adds to the steady wind"),
+    ] = (0.0, 0.0)
+    gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; where they overlap, they add up")] = ()
+    turbulence: Annotated[Literal["none", "light", "moderate", "severe"], About("MIL-F-8785C, low altitude")] = "none"
+    rotation: Annotated[bool, About("the turbulence also turns the air over a 6-DOF aircraft's wing")] = True
+
+    def start(self, *, airspeed: float, altitude: float, step: float, duration: float, seed: int) -> Air:
+        """The air of a flight at this nominal airspeed and altitude, on its grid of steps. SI."""
+        if self == Wind(steady=self.steady, rotation=self.rotation):
+            return Air(steady=self.steady)
+        steps = round(duration / step)
+        time = step * np.arange(steps + 1, dtype=np.float64)
+        gusts = sum((gust.at(time) for gust in self.gusts), np.zeros((len(time), 3)))
+        air = Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)
+        if self.turbulence == "none":
+            return air
+        from harness.world.turbulence import dryden, turbulence  # SciPy is loaded by those who fly in it
+
+        W_x, W_y = self.steady
+        model = dryden(self.turbulence, airspeed, altitude)
+        field = turbulence(model, math.atan2(W_y, W_x), seed, step, steps)
+        return replace(
+            air, gusts=gusts + field.velocity[field.lead :], turbulence=field.rotation if self.rotation else None
+        )
