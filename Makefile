@@ -50,9 +50,9 @@ bench: install  ## the speed of the loop, as ratios in one run, of --help, of re
 	$(BIN)/python -m benchmarks.recording_speed
 	$(BIN)/python -m benchmarks.runs
 
-lock:  ## resolve the dependencies anew (needs uv)
+lock:  ## resolve the dependencies, keeping the pins that still serve (needs uv); UPGRADE=--upgrade moves them all
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \
-		--custom-compile-command "make lock" --output-file requirements.lock --quiet --upgrade
+		--custom-compile-command "make lock" --output-file requirements.lock --quiet $(UPGRADE)
 
 clean:
 	rm -rf .venv out
