@@ -1,0 +1,48 @@
+"""Tables on a terminal and in Markdown."""
+
+import pytest
+
+from harness.tables import markdown, number, table
+
+
+def test_names_stand_left_numbers_right_and_each_heading_stands_on_its_rule() -> None:
+    rows = [["nftsm", "49.7", "ground"], ["smc", "-"]]
+    assert list(table(["law", "settles\ns", "ended"], rows, "lrl")) == [
+        "       settles",
+        "law          s  ended",
+        "-----  -------  ------",
+        "nftsm     49.7  ground",
+        "smc          -",
+    ]
+
+
+def test_the_last_letter_counts_for_all_further_columns_and_a_table_may_lack_headings() -> None:
+    assert list(table([], [["a", "1", "20"], ["b", "10", "2"]], "lr")) == ["a   1  20", "b  10   2"]
+
+
+def test_a_table_is_never_cut() -> None:
+    (line,) = table([], [["x" * 300, "y"]])
+    assert line == "x" * 300 + "  y"
+
+
+def test_a_table_without_rows_is_its_headings() -> None:
+    assert list(table(["a", "b"], [])) == ["a  b", "-  -"]
+    assert list(table([], [])) == []
+
+
+def test_markdown_has_the_same_cells() -> None:
+    assert list(markdown(["law", "settles\ns"], [["a|b", "49.7"]], "lr")) == [
+        "| law | settles s |", "|---|--:|", "| a\\|b | 49.7 |",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "-"), (True, "yes"), (False, "no"), (0.00049, "0"), (-12.345, "-12.3"), (1234.5, "1.23e+03"), (0, "0")],
+)
+def test_a_number_has_three_digits(value: float | bool | None, text: str) -> None:
+    assert number(value) == text
+
+
+def test_a_share_is_written_in_percent() -> None:
+    assert number(0.256, 100.0) == "25.6"
