@@ -1,8 +1,9 @@
 # Everything rests on `install`, which makes .venv from the hashed lock file; needs python3 (3.11 or later), venv, make, pip.
 PYTHON ?= python3
 BIN := .venv/bin
+SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install models identify paper lock turbulence verdict bench clean
+.PHONY: demo test install docs models identify paper lock turbulence verdict bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -12,7 +13,11 @@ test: install  ## everything CI checks
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(SITE)
 	$(BIN)/pytest
+
+docs: install  ## the documents as a site, offline, warnings as errors: out/site/index.html
+	$(SITE)
 
 install: .venv/installed  ## .venv with .venv/bin/harness
 

@@ -25,7 +25,7 @@ Motion = tuple[
 
 
 def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Motion:
-    """Eq. (5), (7), (20), as corrected in `docs/errata.md`, for airspeed `v_a` and heading `psi_a`. SI, rad.
+    """Eq. (5), (7), (20), as corrected in `docs/reference/errata.md`, for airspeed `v_a` and heading `psi_a`. SI, rad.
 
     With lam = theta - pi/2, v sin(psi - lam) is a velocity away from the target, v cos(psi - lam) the one along lam.
     """

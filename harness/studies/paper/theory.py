@@ -1,4 +1,4 @@
-"""The paper's closed forms, corrected where `docs/errata.md` says so: what its theory promises, as numbers."""
+"""The paper's closed forms, corrected as `docs/reference/errata.md` says: what its theory promises, as numbers."""
 
 import math
 
