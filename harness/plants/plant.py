@@ -8,6 +8,7 @@ from typing import Annotated, Protocol
 from annotated_types import Ge
 
 from autopilot.quantities import About, Degrees, Metres, MetresPerSecond
+from harness.error import HarnessError
 from harness.plants.state import State
 from harness.world.air import Air
 
@@ -36,7 +37,7 @@ class End(Exception):  # noqa: N818 - an end is not an error
         self.outcome = outcome
 
 
-class PlantError(ValueError):
+class PlantError(HarnessError, ValueError):
     """The plant cannot be started with these settings; `key` is the one to change."""
 
     def __init__(self, key: str, message: str) -> None:

@@ -13,13 +13,15 @@ from pathlib import Path
 import rerun_cli
 from rerun.experimental import ViewerClient
 
+from harness.error import HarnessError
+
 HOST = "127.0.0.1"
 PORT = 9876  # Rerun's own default: a viewer that was opened otherwise is found there too
 RERUN = Path(rerun_cli.__file__).parent / ("rerun.exe" if os.name == "nt" else "rerun")
 WINDOW = (1600, 1000)
 
 
-class ViewerError(RuntimeError):
+class ViewerError(HarnessError, RuntimeError):
     """The viewer cannot be shown, or reached: why, and what to do, in one line."""
 
 

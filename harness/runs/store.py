@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
+from harness.error import HarnessError
 from harness.key import Version, content_hash
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
@@ -45,7 +46,7 @@ _FAILURES = tuple(outcome.value for outcome in Outcome if outcome.failed)
 _FAILED = f"outcome IN ({', '.join(repr(value) for value in _FAILURES)})"
 
 
-class StoreError(Exception):
+class StoreError(HarnessError):
     """The directory cannot be used: why, in one line."""
 
 

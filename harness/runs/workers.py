@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
+from harness.error import HarnessError
 from harness.flight import Flight
 from harness.key import version_of
 from harness.plants.plant import Outcome
@@ -47,7 +48,7 @@ _NONE = -1
 _SPAWN = multiprocessing.get_context("spawn")
 
 
-class WorkersError(Exception):
+class WorkersError(HarnessError):
     """The workers cannot fly: why, in one line."""
 
 

@@ -1,5 +1,6 @@
 """Settings: the border between a TOML file (keys with unit suffixes, degrees) and a flight (SI, radians)."""
 
+from harness.error import SettingsError
 from harness.settings.experiment import Experiment
 from harness.settings.file import (
     SettingsFile,
@@ -10,7 +11,6 @@ from harness.settings.file import (
     settings_from_text,
 )
 from harness.settings.keys import file_key, put
-from harness.settings.mistake import SettingsError
 from harness.settings.written import document
 
 __all__ = [

@@ -11,12 +11,13 @@ from pathlib import Path
 import aircraft
 from autopilot.laws import LAWS
 from harness.checks import problems
+from harness.error import SettingsError
 from harness.flight import Flight
 from harness.margins import Assess
 from harness.settings.check import checked
 from harness.settings.experiment import CUSTOM, Experiment, document_table
 from harness.settings.keys import file_key, put
-from harness.settings.mistake import Mistake, Place, Places, SettingsError, settings_error
+from harness.settings.mistake import Mistake, Place, Places, settings_error
 from harness.settings.table import Table, table_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
 

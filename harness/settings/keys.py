@@ -3,8 +3,8 @@
 from typing import Any
 
 from autopilot.laws import LAWS
+from harness.error import SettingsError
 from harness.settings.experiment import flight_table
-from harness.settings.mistake import SettingsError
 from harness.settings.table import Table, table_of
 from harness.settings.toml_locator import Key, dotted
 

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic_core import ErrorDetails
 
+from harness.error import SettingsError
 from harness.settings.table import Setting, Table
 from harness.settings.toml_locator import Key, dotted
 
@@ -17,14 +18,6 @@ LARGEST = 1e9  # in file units: what a number that has no bound of its own may b
 _NOUNS: Mapping[object, str] = {float: "number", int: "whole number", str: "string"}
 _COUNTS = {2: "two", 3: "three"}
 _BOUNDS = {Gt: ">", Ge: ">=", Lt: "<", Le: "<="}
-
-
-class SettingsError(Exception):
-    """What is wrong with the settings, one line for each mistake."""
-
-    def __init__(self, lines: Sequence[str]) -> None:
-        super().__init__("\n".join(lines))
-        self.lines = list(lines)
 
 
 class Place(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from harness.error import HarnessError
 from harness.metric import MEANING
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting
@@ -34,7 +35,7 @@ IDEAL: Mapping[str, float] = MappingProxyType({"heading_rate_gain": 1.0, "turn_r
 BOUNDED: Mapping[str, float] = MappingProxyType({"saturation_fraction": 1.0})  # the worst that can be
 
 
-class CompareError(Exception):
+class CompareError(HarnessError, ValueError):
     """Why these flights cannot be compared, and what is missing."""
 
 

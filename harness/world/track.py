@@ -11,6 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+from harness.error import HarnessError
+
 HEADER = ("time_s", "north_m", "east_m")
 FEWEST = 4  # rows that fix a cubic
 LARGEST = 1e9  # s or m
@@ -20,7 +22,7 @@ _Row = tuple[float, float, float]
 Motion = tuple[float, float, float, float, float, float]  # north, east, their rates, that of the speed, turn rate
 
 
-class TrackError(ValueError):
+class TrackError(HarnessError, ValueError):
     """What is wrong with a track, in one line: `FILE:LINE: what`."""
 
 
