@@ -35,7 +35,7 @@ identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 
 paper: install  ## the paper's numbers, figures and claims under docs/, on the airframes too (a quarter of an hour)
 	$(BIN)/harness reproduce --out docs --sixdof
-	$(BIN)/python -m harness.studies.paper.coefficients docs/identified.md
+	$(BIN)/python -m harness.studies.paper.coefficients docs/answers/fitted.md
 
 turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (five minutes on two processors)
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/moderate --log none

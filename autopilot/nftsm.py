@@ -16,7 +16,7 @@ GAIN_SETS = MappingProxyType(
     {
         "paper": {"alpha2": 0.5, "beta2": 0.2, **_TABLE_2},  # Table 2, row NFTSM
         "paper_1": {"alpha2": 2.0, "beta2": 3.0, **_TABLE_2},  # Table 2, row NFTSM_1
-        "identified": {"alpha2": 0.4, "beta2": 2.4, **_TABLE_2},  # gives Table 3's NFTSM rows
+        "fitted": {"alpha2": 0.4, "beta2": 2.4, **_TABLE_2},  # gives Table 3's NFTSM rows
     }
 )
 

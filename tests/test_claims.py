@@ -210,7 +210,7 @@ def test_the_coefficients_document_says_what_the_flights_say() -> None:
     """The fitted and unfitted numbers in full, one row of the map; that no other pair fits is left to `make paper`."""
     from harness.studies.paper.coefficients import BETA2, COARSE, FINE, map_row, point, unfitted_rows
 
-    committed = (DOCS / "identified.md").read_text(encoding="utf-8").splitlines()
+    committed = (DOCS / "answers" / "fitted.md").read_text(encoding="utf-8").splitlines()
     for line in unfitted_rows():
         assert line in committed
     assert map_row(0.4, [point((0.4, beta2, COARSE)) for beta2 in BETA2]) in committed

@@ -42,7 +42,7 @@ def test_a_limited_course_rate_holds_the_circle_where_a_limited_heading_rate_doe
         ("course_rate", 4.7, 16.0 / 200.0, True),
         ("course_rate", 4.4, 16.0 / 200.0, False),
     ):
-        steering = law("nftsm", "identified", max_heading_rate=math.radians(limit), command=command)
+        steering = law("nftsm", "fitted", max_heading_rate=math.radians(limit), command=command)
         flight = replace(windy, law=steering)
         assert needed_rate(flight) == pytest.approx(needed, rel=1e-9)
         assert (feasibility_margin(flight) > 0) is held
@@ -52,7 +52,7 @@ def test_a_limited_course_rate_holds_the_circle_where_a_limited_heading_rate_doe
 @pytest.mark.parametrize("target", [(0.0, 0.0), (3.0, 2.0), (-4.0, 1.0)])
 def test_the_needed_course_rate_is_the_largest_flown_by_an_unlimited_law(target: tuple[float, float]) -> None:
     speed, heading = math.hypot(*target), math.atan2(target[1], target[0])
-    steering = law("nftsm", "identified", max_heading_rate=math.inf, command="course_rate")
+    steering = law("nftsm", "fitted", max_heading_rate=math.inf, command="course_rate")
     flown = replace(
         FLIGHT, law=steering, duration=400.0, guidance_period=0.02,
         wind=Wind(steady=(-2.0, 3.0)), target=Target(speed=speed, heading=heading),

@@ -35,7 +35,7 @@ def ours(number: Number) -> object:
 
 @pytest.mark.parametrize("number", TABLE_3, ids=lambda number: f"{number.law} {number.printed}")
 def test_table_3_is_reproduced_to_the_printed_digits(number: Number) -> None:
-    """Still air, 5 deg/s, a command held for 1 ms; NFTSM with the coefficients identified from its two rows."""
+    """Still air, 5 deg/s, a command held for 1 ms; NFTSM with the coefficients fitted to its two rows."""
     assert number.agrees(ours(number))
 
 

@@ -135,12 +135,12 @@ def test_the_start_at_130_degrees_is_within_remark_2_by_8_degrees_and_outside_eq
     at_30, at_130 = (math.degrees(math.remainder(math.radians(psi) - lam, math.tau)) for psi in (30.0, 130.0))
     assert (at_30, at_130) == pytest.approx((-17.86, 82.14), abs=0.01)
     reach = {}
-    for name in ("paper", "identified"):
+    for name in ("paper", "fitted"):
         g = law("nftsm", name)
         assert isinstance(g, Nftsm)
         reach[name] = math.degrees(manifold_reach(g))
-    assert reach == pytest.approx({"paper": 46.8, "identified": 83.2}, abs=0.1)
-    assert reach["paper"] < at_130 < reach["identified"] < 90.0
+    assert reach == pytest.approx({"paper": 46.8, "fitted": 83.2}, abs=0.1)
+    assert reach["paper"] < at_130 < reach["fitted"] < 90.0
 
 
 def test_holding_the_circle_takes_the_rate_of_the_feasibility_line() -> None:

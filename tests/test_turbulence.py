@@ -270,7 +270,7 @@ def test_an_airframe_survives_moderate_turbulence(name: str, airspeed: float) ->
     flight = Flight(
         plant="sixdof",
         aircraft=name,
-        law=law("nftsm", "identified", max_heading_rate=math.radians(10.0), standoff=200.0 * airspeed / 13.0),
+        law=law("nftsm", "fitted", max_heading_rate=math.radians(10.0), standoff=200.0 * airspeed / 13.0),
         start=Start(airspeed=airspeed),
         wind=Wind(turbulence="moderate"),
         duration=40.0,

@@ -29,7 +29,7 @@ name = "nftsm"
 gains = "paper_1"
 [matrix]
 plant = ["{plant}"]
-"law.gains" = ["paper", "paper_1", "identified"]
+"law.gains" = ["paper", "paper_1", "fitted"]
 """
 
 
@@ -71,7 +71,7 @@ def test_six_flights_are_named_by_what_they_differ_in(out: Path, tmp_path: Path)
     done = command("view", out, *chosen, "--save", tmp_path / "six.rrd")
     assert done.exit_code == 0, done.output
     logs = read_logs(tmp_path / "six.rrd")
-    gains = ("paper", "paper_1", "identified")
+    gains = ("paper", "paper_1", "fitted")
     assert sorted(logs) == sorted(f"{plant} {name}" for plant in ("kinematic", "sixdof") for name in gains)
     assert sorted(log.digest for log in logs.values()) == sorted(load_results(out)["digest"])
     again = command("view", tmp_path / "six.rrd", "--flight", "sixdof paper", "--save", tmp_path / "one.rrd")
@@ -81,7 +81,7 @@ def test_six_flights_are_named_by_what_they_differ_in(out: Path, tmp_path: Path)
 
 
 def test_a_flight_flown_again_that_is_not_the_stored_one_is_said(out: Path, tmp_path: Path) -> None:
-    key = key_of(out, "sixdof", "identified")
+    key = key_of(out, "sixdof", "fitted")
     with sqlite3.connect(out / JOURNAL) as journal:
         (digest,) = journal.execute("SELECT digest FROM flights WHERE key = ?", (key,)).fetchone()
         journal.execute("UPDATE flights SET digest = 'of another flight' WHERE key = ?", (key,))

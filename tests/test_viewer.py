@@ -46,7 +46,7 @@ def six() -> dict[str, FlightLog]:
     """Both plants under three sets of gains; the first two are a pair."""
     return {
         f"{plant} {gains}": simulate(flight(plant, gains))
-        for gains in ("paper_1", "paper", "identified")
+        for gains in ("paper_1", "paper", "fitted")
         for plant in ("kinematic", "sixdof")
     }
 

@@ -26,7 +26,8 @@ def _laws() -> Iterator[str]:
     for name, law in LAWS.items():
         yield f"{name}: {(law.value.__doc__ or '').splitlines()[0]}"
         for gains, values in law.gain_sets.items():
-            yield f"    {gains}: " + ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
+            default = " (default)" if gains == law.default else ""
+            yield f"    {gains}{default}: " + ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
 
 
 def _aircraft() -> Iterator[str]:

@@ -1,6 +1,7 @@
 """The command line: `harness COMMAND`. Exit codes: 0 ok, 1 a flight failed, 2 bad input, 130 interrupted."""
 
 import sys
+import warnings
 
 import click
 
@@ -54,6 +55,7 @@ for command in (
 def main() -> None:
     """The entry point."""
     guard()
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     try:
         code = harness.main(standalone_mode=False)
     except click.ClickException as error:

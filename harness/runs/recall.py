@@ -4,7 +4,6 @@ import atexit
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ from harness.log import FlightLog
 from harness.loop import simulate
 from harness.runs.row import Judged, judged
 from harness.runs.store import Stored, content, find
-from harness.settings import SettingsFile, flight_from_document, overridden
+from harness.settings import SettingsFile, flight_from_document, overridden, without_former_names
 
 
 class Place(NamedTuple):
@@ -56,7 +55,7 @@ class Recalled:
 def recall(place: Place) -> Recalled:
     """The row and its flight. Files that are gone or have changed come from the store. Raises `StoreError`."""
     stored = find(*place)
-    settings = deepcopy(dict(stored.row["flight"]))
+    settings = without_former_names(stored.row["flight"])  # a copy
     then: Mapping[str, str] = stored.version["content"]
     track = settings["target"]["track"]
     if track is not None and _hash(Path(track)) != then["target/track"]:

@@ -10,6 +10,7 @@ from harness.settings.file import (
     read_settings,
     settings_from_text,
 )
+from harness.settings.former_names import without_former_names
 from harness.settings.keys import file_key, put
 from harness.settings.written import document
 
@@ -25,4 +26,5 @@ __all__ = [
     "put",
     "read_settings",
     "settings_from_text",
+    "without_former_names",
 ]

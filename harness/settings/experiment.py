@@ -50,9 +50,10 @@ def law_table(name: str | None, gains_given: bool) -> Table:
     named = {"name": Setting(Literal[*LAWS], "name")}
     if name is None:
         return Table(named, dict, open=True)
-    value, sets = LAWS[name].value, {**LAWS[name].gain_sets, CUSTOM: {}}
+    kind = LAWS[name]
+    value, sets = kind.value, {**kind.gain_sets, CUSTOM: {}}
 
-    def make(name: str, gains: str = "paper", **given: float | str) -> object:
+    def make(name: str, gains: str = kind.default, **given: float | str) -> object:
         return value(**{"gains": gains, **sets[gains], **given})
 
     own = {key: replace(s, required=s.required and gains_given) for key, s in table_of(value).settings.items()}

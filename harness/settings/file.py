@@ -3,6 +3,7 @@
 import re
 import sys
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ from harness.flight import Flight
 from harness.margins import Assess
 from harness.settings.check import checked
 from harness.settings.experiment import CUSTOM, Experiment, document_table
+from harness.settings.former_names import without_former_names
 from harness.settings.keys import file_key, put
 from harness.settings.mistake import Mistake, Place, Places, settings_error
 from harness.settings.table import Table, table_of
@@ -57,6 +59,10 @@ class SettingsFile:
         """Where a field is set, by its dotted name: `FILE:LINE: flight.start.airspeed_mps` for `start.airspeed`."""
         key = file_key(name)
         return f"{self._place(key).text}: {dotted(key)}"
+
+    def warn(self, key: Key, message: str) -> None:
+        """A FutureWarning that says where the key stands."""
+        warnings.warn(f"{self._place(key).text}: {dotted(key)}: {message}", FutureWarning, stacklevel=2)
 
     def _place(self, key: Key) -> Place:
         for length in range(len(key), 0, -1):
@@ -112,7 +118,8 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
         merged[key] = override
     if wrong:
         raise SettingsError(wrong)
-    return replace(file, document=document, overrides=merged)
+    changed = replace(file, document=document, overrides=merged)
+    return replace(changed, document=without_former_names(document, changed.warn))
 
 
 def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:
@@ -120,7 +127,7 @@ def flight_from_document(document: Mapping[str, object], folder: Path = Path()) 
 
     Raises `SettingsError`, its lines without a place.
     """
-    return _flight({"flight": dict(document)}, lambda key: Place(0, ""), folder)
+    return _flight({"flight": without_former_names(document)}, lambda key: Place(0, ""), folder)
 
 
 def _text(path: Path) -> str:

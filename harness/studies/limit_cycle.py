@@ -44,7 +44,7 @@ def airframe_of(name: str) -> tuple[Path, Identified]:
 def loop_of(one: Identified, k2: float = PAPER_K2, k3: float = PAPER_K3, limit_deg_s: float = 5.0) -> Loop:
     """NFTSM with these reaching gains on the paper's circle, at 25 m/s as much wider, behind the response."""
     standoff = 200.0 * one.airspeed / 13.0
-    nftsm = law("nftsm", "identified", k2=k2, k3=k3, standoff=standoff, max_heading_rate=math.radians(limit_deg_s))
+    nftsm = law("nftsm", "fitted", k2=k2, k3=k3, standoff=standoff, max_heading_rate=math.radians(limit_deg_s))
     return Loop(nftsm, one.heading_rate, one.airspeed, PERIOD)
 
 

@@ -97,7 +97,7 @@ CLAIMS: Mapping[str, tuple[Claim, ...]] = MappingProxyType(
             Flown("3.4k", "Theorem 1, in flight", f.reaches_zero),
         ),
         "4 Simulation results: sampling": (
-            Flown("4a", "Table 1's sampling time of 0.5 s serves NFTSM (identified gains)", f.nftsm_sampling),
+            Flown("4a", "Table 1's sampling time of 0.5 s serves NFTSM (fitted gains)", f.nftsm_sampling),
             Flown("4b", "… NFTSM_1", f.nftsm_1_sampling),
             Flown("4c", "… NFTSM with the printed gains", f.printed_sampling),
             Flown("4d", "… SMC", f.smc_sampling),
@@ -110,7 +110,7 @@ CLAIMS: Mapping[str, tuple[Claim, ...]] = MappingProxyType(
             Flown("4.1e", "NFTSM's heading rate is restricted from 8 s to 17 s", s.restricted_8_to_17),
             Flown("4.1f", "NFTSM needs a strong mobility, SMC changes slowly", s.mobility),
             Flown("4.1g", "All three hold the circle without divergence, from 30°", s.they_stay),
-            Flown("4.1h", "Table 3, six rows (NFTSM with the identified gains)", s.table_3),
+            Flown("4.1h", "Table 3, six rows (NFTSM with the fitted gains)", s.table_3),
             Flown("4.1i", "Table 3, NFTSM's two rows with the gains of Table 2", s.table_3_as_printed),
         ),
         "4.2 Constant speed target": (

@@ -236,7 +236,7 @@ def starts_in_the_regions() -> Finding:
         f"ψ̄_a is {bars[30.0]:.1f}° from 30° and {bars[130.0]:.1f}° from 130°: inside Remark 2's region, the second by "
         f"{90.0 - bars[130.0]:.1f}°; Eq. (30) allows {reach['NFTSM as printed']:.1f}° with the printed gains "
         "(the second "
-        f"is outside), {reach['NFTSM']:.1f}° with the identified ones (inside by {reach['NFTSM'] - bars[130.0]:.1f}°)",
+        f"is outside), {reach['NFTSM']:.1f}° with the fitted ones (inside by {reach['NFTSM'] - bars[130.0]:.1f}°)",
     )
 
 

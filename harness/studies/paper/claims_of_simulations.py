@@ -29,7 +29,7 @@ def _numbers(on: Column, where: str, *, printed_gains: bool = False) -> Finding:
 
 
 def table_3(on: Column) -> Finding:
-    """All six rows, NFTSM with the identified gains."""
+    """All six rows, NFTSM with the fitted gains."""
     return _numbers(on, "Table 3")
 
 

@@ -304,7 +304,7 @@ def _period(seconds: float) -> str:
 
 
 def nftsm_sampling(on: Column) -> Finding:
-    """NFTSM with the identified gains."""
+    """NFTSM with the fitted gains."""
     return sampling(on, "NFTSM")
 
 

@@ -234,8 +234,8 @@ def eq_30() -> Finding:
     return holds_if(
         "the gains are the printed ones of NFTSM, or the target rests",
         still["NFTSM"] < 90.0 < min(moving["NFTSM"], still["NFTSM_1"]) and moving["NFTSM as printed"] < 90.0,
-        f"against 90°, target at rest: printed {still['NFTSM as printed']:.1f}°, identified {still['NFTSM']:.1f}°, "
-        f"NFTSM_1 {still['NFTSM_1']:.0f}°; at 2 m/s: printed {moving['NFTSM as printed']:.1f}°, identified "
+        f"against 90°, target at rest: printed {still['NFTSM as printed']:.1f}°, fitted {still['NFTSM']:.1f}°, "
+        f"NFTSM_1 {still['NFTSM_1']:.0f}°; at 2 m/s: printed {moving['NFTSM as printed']:.1f}°, fitted "
         f"{moving['NFTSM']:.1f}°",
     )
 

@@ -1,4 +1,4 @@
-"""Which (alpha2, beta2) give Table 3? `python -m harness.studies.paper.coefficients FILE` writes docs/identified.md.
+"""Which (alpha2, beta2) give Table 3? `python -m harness.studies.paper.coefficients FILE`: docs/answers/fitted.md.
 
 The paper prints (0.5, 0.2) for NFTSM, with which it never converges; its two rows, 31.2 s from 30 deg and 72.9 s from
 130 deg, are two numbers for two unknowns.
@@ -28,7 +28,7 @@ BETA2 = (0.2, 0.5, 0.8, 1.0, 1.2, 1.6, 2.0, 2.4, 2.8, 3.2, 4.0, 5.0, 6.0)
 ONE_DECIMAL = [(i / 10.0, j / 10.0) for i in range(1, 16) for j in range(2, 61)]
 NEAR_ALPHA2 = [0.390 + 0.001 * i for i in range(19)]
 NEAR_BETA2 = [2.30 + 0.01 * j for j in range(21)]
-SETS = ((0.4, 2.4), (0.491, 2.965), (0.672, 0.75))  # spots that give both numbers; the first is `identified`
+SETS = ((0.4, 2.4), (0.491, 2.965), (0.672, 0.75))  # spots that give both numbers; the first is `fitted`
 
 
 class Point(NamedTuple):
@@ -153,14 +153,14 @@ def document(processes: int) -> str:
         f"- Of the {len(ONE_DECIMAL)} pairs with one decimal from (0.1, 0.2) to (1.5, 6), "
         f"{' and '.join(f'({p.alpha2:g}, {p.beta2:g})' for p in exact)} alone give{'s' * (len(exact) == 1)} "
         "both numbers. It is the gain "
-        "set `identified`. The nearest others: "
+        "set `fitted`. The nearest others: "
         + ", ".join(f"({p.alpha2:g}, {p.beta2:g}) {_time(p.from_30)} s / {_time(p.from_130)} s" for p in misses[:4])
         + ".",
         f"- Round it, α2 from {widths[0][0]:.3f} to {widths[0][1]:.3f} and β2 from {widths[1][0]:.2f} to "
         f"{widths[1][1]:.2f} print the same: "
         f"{len(inside)} points of a grid of 0.001 by 0.01, an area of {area:.1e}. That a pair with one decimal "
         "lies in it by luck has a "
-        f"chance of {100.0 * area * 100.0:.0f} %: well, not overwhelmingly, identified.",
+        f"chance of {100.0 * area * 100.0:.0f} %: well determined, though not beyond doubt.",
         "- Without roundness two more spots give both numbers: (0.491, 2.965), which overshoots from 130°, and "
         "(0.672, 0.75), which",
         "  overshoots from both, its β2 being below 1, where the law is singular. Of the pairs with a printed "
@@ -173,7 +173,7 @@ def document(processes: int) -> str:
         "",
         "So (0.4, 2.4) gives the 8 s and the ±0.1 m, and not 38.8 s and 24.3 s; no set gives those two. The "
         "order of the laws is the paper's "
-        "everywhere: NFTSM before NFTSM_1 before SMC ([claims.md](claims.md)).",
+        "everywhere: NFTSM before NFTSM_1 before SMC ([claims.md](../claims.md)).",
         "",
         "## Map",
         "",

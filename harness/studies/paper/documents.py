@@ -45,9 +45,9 @@ def markdown(sections: Sections, findings: Findings) -> str:
         )
     lines += [
         "",
-        "NFTSM is the law with the gain set `identified`, (α2, β2) = (0.4, 2.4), unless said otherwise: those "
+        "NFTSM is the law with the gain set `fitted`, (α2, β2) = (0.4, 2.4), unless said otherwise: those "
         "printed for it "
-        "cannot give its results ([identified.md](identified.md)). How each experiment is read: "
+        "cannot give its results ([answers/fitted.md](answers/fitted.md)). How each experiment is read: "
         "[paper.html](paper.html).",
         "",
         f"| claims of | {' | '.join(Verdict)} |",

@@ -24,7 +24,7 @@ LIMIT = math.radians(5.0)  # rad/s, Table 1
 
 LAWS: Mapping[str, tuple[str, str]] = MappingProxyType(  # name and gain set
     {
-        "NFTSM": ("nftsm", "identified"),
+        "NFTSM": ("nftsm", "fitted"),
         "NFTSM as printed": ("nftsm", "paper"),
         "NFTSM_1": ("nftsm", "paper_1"),
         "SMC": ("smc", "paper"),
