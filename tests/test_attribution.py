@@ -4,10 +4,10 @@ import itertools
 
 import pandas as pd
 import pytest
-from made_up import QUIET, flight, table
 
 from harness.verdict.attribution import attributions
 from harness.verdict.pairs import entered
+from tests.builders import QUIET, result, results
 
 
 def ladder() -> pd.DataFrame:
@@ -17,8 +17,8 @@ def ladder() -> pd.DataFrame:
     for i, seed, wind, turbulence in itertools.product(range(4), range(6), (0.0, 5.0), ("none", "light", "moderate")):
         value = (i * (i + 1)) / 2 + 0.1 * seed + 2.0 * wind + {"none": 0.0, "light": 4.0, "moderate": 9.0}[turbulence]
         metrics = {**QUIET, "range_error_rms_m": value}
-        rows.append(flight(rungs[i], seed, metrics, **{"wind.steady_mps": (wind, 0.0), "wind.turbulence": turbulence}))
-    return table(rows)
+        rows.append(result(rungs[i], seed, metrics, {"wind.steady_mps": (wind, 0.0), "wind.turbulence": turbulence}))
+    return results(rows)
 
 
 def test_the_rungs_add_up_from_the_first_plant_to_the_last() -> None:

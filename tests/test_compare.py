@@ -7,15 +7,12 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
 
-import aircraft
-from harness.cli.main import harness as command_line
+from tests.builders import DOCS, EXPERIMENTS, ROOT, command, copied_airframe, invoke, write
 
 EXPERIMENT = """\
 title = "Two limits"
@@ -34,17 +31,10 @@ sideslip_deg = 1.0
 """
 
 
-def harness(*words: object) -> Result:
-    """The command line in this process: a new one would import pandas and SciPy each time."""
-    return CliRunner().invoke(command_line, [str(word) for word in words])
-
-
 def run(folder: Path, text: str, *words: object) -> Path:
     """Flies the experiment into a directory beside it, by the command itself: its line is kept with the results."""
-    file, out = folder / "experiment.toml", folder / "out"
-    file.write_text(text, encoding="utf-8")
-    command = ["-m", "harness", "run", file, "--out", out, "--workers", 0, "--log", "none", *words]
-    done = subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True, check=False)
+    file, out = write(folder / "experiment.toml", text), folder / "out"
+    done = command("run", file, "--out", out, "--workers", 0, "--log", "none", *words)
     assert done.returncode == 0, done.stderr
     return out
 
@@ -56,14 +46,14 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(flown: Path) -> Path:
-    done = harness("report", flown)
+    done = invoke("report", flown)
     assert done.exit_code == 0, done.stderr
     assert done.stdout == f"{flown / 'report.html'}\n"
     return flown / "report.html"
 
 
 def compared(flown: Path, *words: object) -> dict[str, Any]:
-    done = harness("compare", flown, "--json", *words)
+    done = invoke("compare", flown, "--json", *words)
     assert done.exit_code == 0, done.stderr
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer
@@ -75,7 +65,7 @@ def finding(answer: dict[str, Any], part: str) -> dict[str, Any]:
 
 
 def test_real_flights_are_paired_and_told_with_their_intervals(flown: Path) -> None:
-    done = harness("compare", flown)
+    done = invoke("compare", flown)
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("10 pairs of sixdof beside kinematic, 5 seeds, from 20 flights\n")
     line = next(line for line in done.stdout.splitlines() if "convergence_time_s" in line)
@@ -112,21 +102,21 @@ def test_a_margin_on_the_command_line_changes_the_verdict(flown: Path) -> None:
 
 
 def test_csv_and_latex_hold_every_difference(flown: Path) -> None:
-    rows = list(csv.DictReader(io.StringIO(harness("compare", flown, "--csv").stdout)))
+    rows = list(csv.DictReader(io.StringIO(invoke("compare", flown, "--csv").stdout)))
     differences = compared(flown)["differences"]
     assert [row["metric"] for row in rows] == [one["metric"] for one in differences]
     for row, one in zip(rows, differences, strict=True):
         assert row["difference"] == ("" if one["difference"]["mean"] is None else repr(one["difference"]["mean"]))
-    latex = harness("compare", flown, "--latex").stdout
+    latex = invoke("compare", flown, "--latex").stdout
     assert latex.count(r"\\") == len(rows) + 2
     assert latex.count("{") == latex.count("}")
     assert not re.search(r"(?<!\\)_", latex)
 
 
 def test_the_same_flights_give_the_same_words_and_the_same_page(flown: Path, page: Path, tmp_path: Path) -> None:
-    assert harness("compare", flown, "--json").stdout == harness("compare", flown, "--json").stdout
+    assert invoke("compare", flown, "--json").stdout == invoke("compare", flown, "--json").stdout
     again = tmp_path / "again.html"
-    assert harness("report", flown, "--out", again).exit_code == 0
+    assert invoke("report", flown, "--out", again).exit_code == 0
     assert again.read_bytes() == page.read_bytes()
 
 
@@ -140,8 +130,8 @@ def test_the_same_flights_give_the_same_words_and_the_same_page(flown: Path, pag
     ],
 )
 def test_what_cannot_be_compared_is_one_line_and_exit_code_2(flown: Path, words: list[str], told: str) -> None:
-    for command in ("compare", "report"):
-        done = harness(command, flown, *words)
+    for name in ("compare", "report"):
+        done = invoke(name, flown, *words)
         assert done.exit_code == 2
         (line,) = done.stderr.splitlines()
         assert told in line
@@ -149,8 +139,8 @@ def test_what_cannot_be_compared_is_one_line_and_exit_code_2(flown: Path, words:
 
 def test_no_run_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "nothing"):
-        for command in ("compare", "report"):
-            done = harness(command, folder)
+        for name in ("compare", "report"):
+            done = invoke(name, folder)
             assert done.exit_code == 2
             (line,) = done.stderr.splitlines()
             assert line.startswith(f"{folder}: ")
@@ -158,7 +148,7 @@ def test_no_run_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
 
 
 def test_one_flight_has_nothing_to_be_compared_with(tmp_path: Path) -> None:
-    done = harness("compare", run(tmp_path, EXPERIMENT, "--limit", 1))
+    done = invoke("compare", run(tmp_path, EXPERIMENT, "--limit", 1))
     assert done.exit_code == 2
     assert done.stderr.endswith("a comparison takes at least two, of kinematic and another plant\n")
 
@@ -166,7 +156,7 @@ def test_one_flight_has_nothing_to_be_compared_with(tmp_path: Path) -> None:
 def test_a_flight_without_a_partner_is_listed(tmp_path: Path) -> None:
     text = EXPERIMENT.replace("40.0", "10.0", 1)
     out = run(tmp_path, text, "--limit", 3)
-    told = harness("compare", out).stdout.splitlines()
+    told = invoke("compare", out).stdout.splitlines()
     (alone,) = compared(out)["unpaired"]
     (at,) = (i for i, line in enumerate(told) if line == "1 flight without a partner:")
     assert told[at + 1].startswith(f"  {alone['key'][:12]} completed: plant = kinematic, ")
@@ -180,12 +170,12 @@ def test_still_air_and_a_fixed_start_give_one_difference_and_no_interval(tmp_pat
     assert sideslip["effect"]["mean"] > 0.0
     assert sideslip["effect"]["low"] is sideslip["effect"]["high"] is None
     assert all(cell["p"] is None for cell in sideslip["cells"])
-    assert "No interval (no variation: the seeds change nothing): " in harness("compare", out).stdout
+    assert "No interval (no variation: the seeds change nothing): " in invoke("compare", out).stdout
 
 
 def test_the_full_matrix_goes_all_the_way_when_reduced(tmp_path: Path) -> None:
     """`make verdict` on the first airframe, law and circle of one seed: every plant, every disturbance."""
-    file = Path(__file__).parent.parent / "experiments" / "assumption.toml"
+    file = EXPERIMENTS / "assumption.toml"
     words = ("--limit", 32, "--set", "duration_s=20.0", "--set", "law.max_heading_rate_deg_s=10.0")
     out = run(tmp_path, file.read_text(encoding="utf-8"), *words)
     answer = compared(out)
@@ -198,19 +188,17 @@ def test_the_full_matrix_goes_all_the_way_when_reduced(tmp_path: Path) -> None:
         "wind 2 m/s", "turbulence light", "turbulence moderate", "sampling 0.2 s", "estimator ekf",
         "airspeed used measured",
     ]  # fmt: skip
-    assert harness("report", out, "--markdown", tmp_path / "results.md").exit_code == 0
+    assert invoke("report", out, "--markdown", tmp_path / "results.md").exit_code == 0
 
 
 def test_flights_of_two_inner_loops_are_not_compared(tmp_path: Path) -> None:
-    airframe = tmp_path / "stick"
-    shutil.copytree(aircraft.folder("ultra_stick_25e"), airframe)
-    (airframe / "ultra_stick_25e.xml").rename(airframe / "stick.xml")
+    airframe = copied_airframe("ultra_stick_25e", tmp_path / "stick")
     text = EXPERIMENT.replace('plant = "sixdof"\n', f'plant = "sixdof"\naircraft = "{airframe}"\n', 1)
     text = text.replace("count = 5", "count = 1").replace("[5.0, 20.0]", "[5.0]").replace("40.0", "10.0", 1)
-    assert harness("compare", run(tmp_path, text)).exit_code == 0
+    assert invoke("compare", run(tmp_path, text)).exit_code == 0
     model = airframe / "stick.xml"
-    model.write_text(model.read_text(encoding="utf-8").replace("</fdm_config>", "<!-- edited -->\n</fdm_config>"))
-    done = harness("compare", run(tmp_path, text))
+    write(model, model.read_text(encoding="utf-8").replace("</fdm_config>", "<!-- edited -->\n</fdm_config>"))
+    done = invoke("compare", run(tmp_path, text))
     assert done.exit_code == 2
     assert "of different versions, which a comparison must not mix: aircraft/model of" in done.stderr
 
@@ -270,8 +258,7 @@ def test_a_browser_fetches_nothing_for_the_page(page: Path, tmp_path: Path) -> N
     assert asks in bare
     fetched = []
     for i, text in enumerate((bare, bare.replace("</body>", f'<img src="{picture}"></body>'))):
-        copy = tmp_path / f"copy-{i}.html"
-        copy.write_text(text, encoding="utf-8")
+        copy = write(tmp_path / f"copy-{i}.html", text)
         title = re.search(r"<title>([^<]*)</title>", opened(copy, tmp_path / "profile").stdout)
         assert title
         fetched.append(title[1].split())
@@ -280,7 +267,7 @@ def test_a_browser_fetches_nothing_for_the_page(page: Path, tmp_path: Path) -> N
 
 def test_markdown_says_the_same_and_how_it_was_made(flown: Path, tmp_path: Path) -> None:
     path = tmp_path / "results.md"
-    assert harness("report", flown, "--markdown", path).exit_code == 0
+    assert invoke("report", flown, "--markdown", path).exit_code == 0
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# Two limits\n\nDoes it hold at 5 and at 20 deg/s?\n\n10 pairs of sixdof beside kinematic")
     for sentence in compared(flown)["answer"]:
@@ -301,8 +288,7 @@ def test_markdown_says_the_same_and_how_it_was_made(flown: Path, tmp_path: Path)
 
 
 def test_the_readme_answers_with_the_sentences_of_the_results() -> None:
-    root = Path(__file__).parent.parent
-    results, readme = (root.joinpath(name).read_text(encoding="utf-8") for name in ("docs/results.md", "README.md"))
+    results, readme = (path.read_text(encoding="utf-8") for path in (DOCS / "results.md", ROOT / "README.md"))
     answer = results.split("## The answer")[1].split("##")[0].strip().split("\n\n")
     assert len(answer) == 3
     for sentence in answer:
@@ -310,6 +296,6 @@ def test_the_readme_answers_with_the_sentences_of_the_results() -> None:
 
 
 def test_two_places_for_one_page_are_refused(flown: Path, tmp_path: Path) -> None:
-    done = harness("report", flown, "--out", tmp_path / "a.html", "--markdown", tmp_path / "b.md")
+    done = invoke("report", flown, "--out", tmp_path / "a.html", "--markdown", tmp_path / "b.md")
     assert done.exit_code == 2
     assert list(tmp_path.iterdir()) == []
