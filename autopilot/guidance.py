@@ -42,7 +42,7 @@ class Guidance(NamedTuple):
     unlimited_command: float
 
 
-Step = Callable[[Observation], Guidance]
+LawStep = Callable[[Observation], Guidance]
 
 
 class Law(Protocol):
@@ -57,7 +57,7 @@ class Law(Protocol):
         """The quantity that the limit limits."""
         ...
 
-    def start(self) -> Step:
+    def start(self) -> LawStep:
         """A fresh law in flight."""
         ...
 

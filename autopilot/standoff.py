@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt
 
 from autopilot.angles import wrap
-from autopilot.guidance import Guidance, Observation, Step
+from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
 _POINTS = 360  # on the circle, the first with the wind
@@ -108,7 +108,7 @@ class StandoffLaw:
     ] = "heading_rate"
 
 
-def standoff_step(law: StandoffLaw, reach: Reaching) -> Step:
+def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
     """The law in flight: `reach` gives (feed-forward, rest of the command, s) for the paper's way round."""
     R_d, max_rate = law.standoff, law.max_heading_rate
     measured, by_course = law.airspeed == "measured", law.command == "course_rate"

@@ -17,11 +17,11 @@ from harness.loop import simulate
 from harness.provenance import provenance
 from harness.runs.matrix import Matrix, read_matrix
 from harness.runs.results import export, load_results
-from harness.runs.row import flown, judged, row
+from harness.runs.row import result_of, row, simulate_safely
 from harness.runs.run import Options, positions_done, run
 from harness.runs.store import Store
 from harness.runs.survey import survey
-from harness.runs.workers import Flown, Task, fly_task
+from harness.runs.workers import Task, WorkerResult, fly_task
 from harness.settings import read_settings
 
 ROWS = 100_000
@@ -57,12 +57,12 @@ def rate(of: Matrix, folder: Path, workers: int) -> float:
     return (last_done - first_done) / (last - first)
 
 
-def timed(task: Task, folder: Path) -> Flown:
+def timed(task: Task, folder: Path) -> WorkerResult:
     """As a worker does it, with the processor time of the simulation in place of its wall time."""
     begin = time.process_time()
-    log = flown(task.flight)
-    how = judged(log, time.process_time() - begin)
-    return Flown(how, version_of(task.flight).number)
+    log = simulate_safely(task.flight)
+    result = result_of(log, time.process_time() - begin)
+    return WorkerResult(result, version_of(task.flight).number)
 
 
 def overhead(few: Matrix, many: Matrix, folder: Path) -> float:
@@ -86,19 +86,19 @@ def fill(of: Matrix, folder: Path, count: int) -> None:
     """The store as after `count` flights: real settings and keys, each with the result of the first."""
     with Store(folder) as store:
         store.begin(provenance(of.file.path, "", ""))
-        how = None
+        result = None
         for combination in of.combinations():
             if combination.position == count:
                 break
             flight = of.flight(combination)
-            how = how or judged(simulate(flight), 0.01)
+            result = result or result_of(simulate(flight), 0.01)
             one = identity(flight)
             store.add_version(one.version, files(flight))
             store.place(of.identifier, combination.position, one.key)
-            store.add(row(flight, one, how), how, one.version.number, combination.position)
+            store.add(row(flight, one, result), result, one.version.number, combination.position)
 
 
-def began(task: Task, folder: Path) -> Flown:
+def began(task: Task, folder: Path) -> WorkerResult:
     """In a worker: tells that it flies."""
     (folder / "began").touch()
     return fly_task(task, folder)

@@ -20,7 +20,7 @@ WIND_TOLERANCE = 1e-6  # m/s
 UNIT_TOLERANCE = 1e-4  # relative: JSBSim rounds its factor for kg m^2
 
 
-class Finding(NamedTuple):
+class SelfTest(NamedTuple):
     """One thing examined."""
 
     what: str
@@ -28,22 +28,22 @@ class Finding(NamedTuple):
     sound: bool
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[SelfTest]:
     """Everything the doctor looks at, one by one."""
-    yield Finding("python", platform.python_version(), True)
+    yield SelfTest("python", platform.python_version(), True)
     for package in PACKAGES:
         try:
-            yield Finding(package, version(package), True)
+            yield SelfTest(package, version(package), True)
         except PackageNotFoundError:
-            yield Finding(package, "not installed", False)
+            yield SelfTest(package, "not installed", False)
     for name in aircraft.names():
         airframe = aircraft.folder(name)
         start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=1.0)
         error = max(wind_triangle_error(airframe, start, Air(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0)))
-        yield Finding(f"wind, {name}", f"v_ground - v_air - wind: {error:.1e} m/s", error < WIND_TOLERANCE)
+        yield SelfTest(f"wind, {name}", f"v_ground - v_air - wind: {error:.1e} m/s", error < WIND_TOLERANCE)
         units = compare_units(airframe)
         what, error = max(((u.what, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
-        yield Finding(f"units, {name}", f"{len(units)} quantities, worst {error:.1e} ({what})", error < UNIT_TOLERANCE)
+        yield SelfTest(f"units, {name}", f"{len(units)} quantities, worst {error:.1e} ({what})", error < UNIT_TOLERANCE)
 
 
 def wind_triangle_error(airframe: Path, start: Start, air: Air) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """A name beside the path to write to, which becomes the path at the end. OSError of the path when that fails."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:

@@ -14,8 +14,8 @@ from harness.flight import Flight
 from harness.plants.ladder import PLANTS
 from harness.settings import document
 
-PHYSICS = 2  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
-METRICS = 2  # of what a log is judged by: raised whenever a change there moves a metric
+PHYSICS_VERSION = 2  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
+METRICS_VERSION = 2  # of what a log is judged by: raised whenever a change there moves a metric
 
 
 class Version(NamedTuple):
@@ -51,7 +51,7 @@ def version_of(flight: Flight) -> Version:
     }
     paths = _paths(flight.plant, flight.aircraft, flight.target.track)
     changed = tuple((name, path, path.stat().st_mtime_ns) for name, path in paths)
-    return _version(PHYSICS, METRICS, changed, tuple(libraries.items()))
+    return _version(PHYSICS_VERSION, METRICS_VERSION, changed, tuple(libraries.items()))
 
 
 def flight_key(flight: Flight) -> str:

@@ -6,7 +6,7 @@ from struct import Struct
 
 import numpy as np
 
-from autopilot.guidance import Guidance, Observation, Step
+from autopilot.guidance import Guidance, LawStep, Observation
 from harness.checks import problems
 from harness.flight import Flight, air_of, plant_of
 from harness.knowledge import Estimation, told
@@ -87,7 +87,7 @@ def observe(state: State, nominal_airspeed: float, wind: tuple[float, float], se
     return Observation._make((*state[:_OWN], nominal_airspeed, *wind, *seen))
 
 
-def command(law: Step, observation: Observation) -> Guidance:
+def command(law: LawStep, observation: Observation) -> Guidance:
     """The law's answer. Raises `End` when it fails or is not finite: a law's fault is a flight's outcome."""
     try:
         guidance = law(observation)

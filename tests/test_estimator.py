@@ -13,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from autopilot.estimator import Estimator, Measurement, Tracker, initial, linearised, measurement, residual
-from autopilot.guidance import Guidance, Observation, Step
+from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.laws import law
 from harness.checks import problems
 from harness.flight import Flight, MetricSettings, air_of, plant_of
@@ -188,7 +188,7 @@ class Listening:
     standoff: float = 200.0
     max_heading_rate: float = 0.1
 
-    def start(self) -> Step:
+    def start(self) -> LawStep:
         def step(observation: Observation) -> Guidance:
             self.heard.append(observation)
             return Guidance(0.0, 7.0, 0.0, 0.0, 0.0, 0.0)

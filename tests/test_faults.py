@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 
 import harness
-from harness.runs.estimate import guess
 from harness.runs.matrix import read_matrix
 from harness.runs.run import Options, Progress, run
 from harness.runs.store import JOURNAL, StoreError, begun, reading
-from harness.runs.workers import Flown, Task, fly_task
+from harness.runs.wall_time import typical_wall_time
+from harness.runs.workers import Task, WorkerResult, fly_task
 from harness.settings import read_settings
 
 KINEMATIC = """\
@@ -134,7 +134,7 @@ def test_a_parent_killed_at_ten_moments_loses_no_flight_and_flies_none_twice(tmp
     assert digests(out) == digests(tmp_path / "undisturbed")
 
 
-def die(task: Task, folder: Path) -> Flown:
+def die(task: Task, folder: Path) -> WorkerResult:
     """Flies, but for two flights, where it is killed."""
     if task.position in (3, 17):
         os.kill(os.getpid(), signal.SIGKILL)
@@ -178,7 +178,7 @@ def test_a_worker_that_is_killed_from_outside_is_one_row(tmp_path: Path) -> None
     assert Counter(harness.load_results(tmp_path / "out")["outcome"]) == {"completed": 2, "worker_died": 1}
 
 
-def hang(task: Task, folder: Path) -> Flown:
+def hang(task: Task, folder: Path) -> WorkerResult:
     """Flies, but for two flights: one sleeps, one is lost in a library that lets no signal through."""
     if task.position == 2:
         time.sleep(1000.0)
@@ -201,7 +201,7 @@ def test_a_flight_may_take_twenty_times_its_estimate(tmp_path: Path, monkeypatch
     monkeypatch.setattr("harness.runs.workers.SHORTEST_TIMEOUT", 0.0)
     file = settings(tmp_path, count=3, duration=2000.0)
     matrix = read_matrix(read_settings(file))
-    (limit,) = {20.0 * guess(matrix.flight(combination)) for combination in matrix.combinations()}
+    (limit,) = {20.0 * typical_wall_time(matrix.flight(combination)) for combination in matrix.combinations()}
     flown(file, tmp_path / "out", fly=hang, workers=1)
     results = harness.load_results(tmp_path / "out")
     assert results["outcome"].tolist() == ["completed", "completed", "timeout"]
@@ -352,7 +352,7 @@ def test_a_worker_has_one_numeric_thread(tmp_path: Path) -> None:
     assert reason == "it could not be flown: RuntimeError: 1 1 1"
 
 
-def threads(task: Task, folder: Path) -> Flown:
+def threads(task: Task, folder: Path) -> WorkerResult:
     """Fails, and tells how many threads the numeric libraries would use."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     raise RuntimeError(" ".join(os.environ.get(name, "many") for name in names))

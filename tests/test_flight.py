@@ -124,7 +124,7 @@ def test_an_airspeed_outside_the_envelope_is_a_warning() -> None:
     assert ["18 to 35 m/s" in text for text in warnings(slow)] == [True]
 
 
-@pytest.mark.parametrize("changed", ["PHYSICS", "METRICS"])
+@pytest.mark.parametrize("changed", ["PHYSICS_VERSION", "METRICS_VERSION"])
 def test_other_physics_or_metrics_give_another_key(monkeypatch: pytest.MonkeyPatch, changed: str) -> None:
     before = flight_key(FLIGHT)
     monkeypatch.setattr(f"harness.key.{changed}", 0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from autopilot.guidance import Guidance, Observation, Step
+from autopilot.guidance import Guidance, LawStep, Observation
 from harness.cli.predict import predict
 from harness.identification.manoeuvres import STEP
 from harness.limit_cycle.prediction import VISIBLE, Loop, boundary, critical_gain, limit_cycle
@@ -37,7 +37,7 @@ class Proportional:
     standoff: float = 200.0
     max_heading_rate: float = math.radians(5.0)
 
-    def start(self) -> Step:
+    def start(self) -> LawStep:
         def step(o: Observation) -> Guidance:
             azimuth = math.atan2(o.east, o.north)
             error = math.remainder(o.heading - (azimuth - 0.5 * math.pi), math.tau)

@@ -140,7 +140,7 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
     assert other["key"] == harness.load_results(out).iloc[0]["key"]
     told = command("show", place)
     assert told.returncode == 0, told.stderr
-    for word in ("It flew to its end.", "sixdof ultra_stick_25e", "bank_peak_deg", row["digest"]):
+    for word in ("The flight lasted its full duration.", "sixdof ultra_stick_25e", "bank_peak_deg", row["digest"]):
         assert word in told.stdout
     listed = command("show", out).stdout.splitlines()
     assert len(listed) == 1 + 10

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import aircraft
-from autopilot.guidance import Guidance, Observation, Step
+from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.laws import law
 from harness.doctor import wind_triangle_error
 from harness.flight import Flight
@@ -142,7 +142,7 @@ class Faulty:
     max_heading_rate: float = 0.1
     command: str = "heading_rate"
 
-    def start(self) -> Step:
+    def start(self) -> LawStep:
         calls = count()
 
         def step(o: Observation) -> Guidance:

@@ -29,11 +29,11 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
       harness export flight.rrd --to parquet --out flight.parquet
     """
     from harness.cli._input import writable
-    from harness.files import whole
+    from harness.files import replacing
 
     table, name = _table(what, flight)
     path = writable(out or Path(f"{name}.{kind}"))
-    with whole(path) as partial:
+    with replacing(path) as partial:
         if kind == "csv":
             table.to_csv(partial, index=False)
         else:
@@ -44,12 +44,12 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
 def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
     """The log, and a name for the file."""
     from harness.cli._input import BadInput
-    from harness.runs.recall import place_of
+    from harness.runs.recall import row_address
     from harness.runs.store import StoreError, find
     from harness.settings import SettingsError
 
     try:
-        if place := place_of(what):
+        if place := row_address(what):
             import pandas as pd
 
             from harness.log import COLUMNS

@@ -10,8 +10,8 @@ import click
 
 if TYPE_CHECKING:
     from harness.review.live import Live
-    from harness.runs.recall import Place, Recalled
-    from harness.runs.row import Judged
+    from harness.runs.recall import Recalled, RowAddress
+    from harness.runs.row import FlightResult
 
 
 @click.command()
@@ -49,13 +49,13 @@ def fly(
     from harness.key import identity
     from harness.loop import simulate
     from harness.metric import MEANING
-    from harness.runs.recall import place_of
-    from harness.runs.row import judged, row
+    from harness.runs.recall import row_address
+    from harness.runs.row import result_of, row
     from harness.tables import number
 
     if not live and (pace is not None or port is not None):
         raise BadInput("--pace and --port are of --live: add it")
-    place = place_of(what)
+    place = row_address(what)
     if not place and Path(what).is_dir():
         raise BadInput(f"{what}: is a directory; a flight of it is {what}:KEY, by `harness show {what}`")
     recalled = _recalled(place) if place else None
@@ -72,19 +72,19 @@ def fly(
         stream.finish(log, typed())
         if stream.gone:
             click.echo("warning: the viewer was closed during the flight", err=True)
-    how = judged(log)
-    result = row(flight, identity(flight), how)
+    result = result_of(log)
+    flight_row = row(flight, identity(flight), result)
     if recalled and not overrides:
-        result.update(key=recalled.stored.row["key"], flight=recalled.stored.row["flight"])
-        _compare(recalled, how)
+        flight_row.update(key=recalled.stored.row["key"], flight=recalled.stored.row["flight"])
+        _compare(recalled, result)
     if rrd is not None:
         from harness.review.recording import write_recording
 
         write_recording(rrd, {flight.plant: log}, Path(what).stem, command=typed())
     if as_json:
-        click.echo(json.dumps(result, allow_nan=False))
+        click.echo(json.dumps(flight_row, allow_nan=False))
     else:
-        _tell(result, {name: (number(value), MEANING[name]) for name, value in result["metrics"].items()})
+        _tell(flight_row, {name: (number(value), MEANING[name]) for name, value in flight_row["metrics"].items()})
     raise SystemExit(1 if log.outcome.failed else 0)
 
 
@@ -100,7 +100,7 @@ def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live
         raise BadInput(str(error)) from None
 
 
-def _recalled(place: Place) -> Recalled:
+def _recalled(place: RowAddress) -> Recalled:
     from harness.cli._input import BadInput
     from harness.runs.recall import recall
     from harness.runs.store import StoreError
@@ -111,13 +111,13 @@ def _recalled(place: Place) -> Recalled:
         raise BadInput(str(error)) from None
 
 
-def _compare(recalled: Recalled, how: Judged) -> None:
+def _compare(recalled: Recalled, result: FlightResult) -> None:
     """Says whether the flight is the stored one, to the last bit."""
     from harness.runs.recall import deviation
 
     if not recalled.digest:
         click.echo(f"the row has no digest to compare with: it ended in {recalled.stored.row['outcome']}", err=True)
-    elif apart := deviation(recalled.stored, how):
+    elif apart := deviation(recalled.stored, result):
         why = (
             f"changed since: {', '.join(recalled.changed)}" if recalled.changed else "though nothing known has changed"
         )

@@ -28,10 +28,10 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     from aircraft import limits
     from harness.checks import airframe_of
     from harness.cli._input import BadInput, writable, writable_folder
-    from harness.files import whole
+    from harness.files import replacing
     from harness.identification import identify as job
     from harness.identification.figures import bode_plot, step_plot
-    from harness.identification.telling import told
+    from harness.identification.summary import summary_lines
     from harness.plants.identified import IdentifiedError, document, read
     from harness.plants.plant import End, PlantError
 
@@ -59,10 +59,10 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
             raise BadInput(f"--airspeed: {error}") from None
         except End as end:
             raise BadInput(f"--airspeed: at {speed:g} m/s a manoeuvre ended early, {end.outcome}: {end}") from None
-    for line in told(found):
+    for line in summary_lines(found):
         click.echo(line)
     drawn = {path: plot(found) for path, plot in plots.items()}
     for path, text in {file: document(airframe, [*others, found.identified]), **drawn}.items():
-        with whole(path) as partial:
+        with replacing(path) as partial:
             partial.write_text(text, encoding="utf-8")
     click.echo(f"kept in {file}; drawn in {', '.join(map(str, plots))}")

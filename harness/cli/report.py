@@ -21,7 +21,7 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
     """
     from harness.cli._comparison import read_comparison
     from harness.cli._input import BadInput, busy, writable
-    from harness.files import whole
+    from harness.files import replacing
     from harness.verdict import report as job
 
     if out is not None and markdown is not None:
@@ -32,6 +32,6 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
     with busy("comparing and drawing"):
         comparison, origin = read_comparison(directory, baseline, overrides)
         text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
-        with whole(path) as partial:
+        with replacing(path) as partial:
             partial.write_text(text, encoding="utf-8")
     click.echo(f"{path}")

@@ -26,7 +26,7 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
       harness reproduce --out out/paper --sixdof
     """
     from harness.cli._input import writable, writable_folder
-    from harness.files import whole
+    from harness.files import replacing
     from harness.studies.paper import documents, job, ledger
     from harness.studies.paper import reproduce as numbers
     from harness.studies.paper.claims import CLAIMS
@@ -42,7 +42,7 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     if on_airframes:
         written[on_airframes] = documents.airframes_markdown(CLAIMS, everything.findings)
     for path, text in written.items():
-        with whole(path) as partial:
+        with replacing(path) as partial:
             partial.write_text(text, encoding="utf-8")
     for line in numbers.table(everything.numbers):
         click.echo(line)

@@ -23,11 +23,11 @@ def show(row: str) -> None:
       harness show out/wind:3f2a
     """
     from harness.cli._input import BadInput
-    from harness.runs.recall import place_of
+    from harness.runs.recall import row_address
     from harness.runs.store import StoreError, find
     from harness.runs.story import story
 
-    place = place_of(row)
+    place = row_address(row)
     if place is None and not Path(row).is_dir():
         raise BadInput(f"{row}: is no DIR:KEY, a directory of `harness run` and the beginning of a key")
     try:

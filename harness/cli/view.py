@@ -68,9 +68,9 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
 def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, FlightLog] | None:
     """The flights asked for, by name; None: all of a recording, as it is."""
     from harness.cli._input import BadInput
-    from harness.review.shown import MOST
+    from harness.review.styled import MOST
     from harness.runs.logs import named, pair_of_row
-    from harness.runs.recall import place_of
+    from harness.runs.recall import row_address
     from harness.runs.store import StoreError
     from harness.settings import SettingsError
 
@@ -83,7 +83,7 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
         if pair is not None:
             raise BadInput(f"{what}: is one file; --pair is for a directory of `harness run`")
         return _of_file(path, flights)
-    place = place_of(what)
+    place = row_address(what)
     if place is not None:
         flights, path = (place.beginning, *flights), place.folder
     elif not path.is_dir():

@@ -12,7 +12,7 @@ from autopilot.angles import wrap
 from autopilot.quantities import About
 from harness.plants.level import Level
 from harness.plants.plant import Flying, Start
-from harness.plants.response import Motion, Response, dot, gauss
+from harness.plants.response import Propagator, Response, dot, gauss
 from harness.plants.turn import GRAVITY, bank_of_turn
 from harness.world.air import Air
 
@@ -52,16 +52,16 @@ class Coordinated:
 
 class _CoordinatedFlying:
     def __init__(self, plant: Coordinated, start: Start, air: Air) -> None:
-        self._motion, self._level = Motion(plant.bank, _NODES), Level(start, air)
+        self._propagator, self._level = Propagator(plant.bank, _NODES), Level(start, air)
         self._hold, self._limit, self._nominal = plant.airspeed, plant.bank_limit, start.airspeed
         self._change = self._summed = 0.0  # of the airspeed, m/s, and its integral, m
         self.state = self._level.state(*start.position, start.airspeed, wrap(start.heading), 0.0, 0.0, 0.0, 0.0)
 
     def advance(self, heading_rate: float, period: float) -> None:
-        motion = self._motion
+        propagator = self._propagator
         x, y, psi = self.state.north, self.state.east, self.state.heading
         command = bank_of(heading_rate, self._nominal, self._limit)
-        for now, piece in motion.pieces(command, period):
+        for now, piece in propagator.pieces(command, period):
             h = piece.length
             tangents = [math.tan(dot(row, now)) for row in piece.outputs]
             excess = [math.sqrt(1.0 + t * t) - 1.0 for t in tangents]
@@ -74,9 +74,9 @@ class _CoordinatedFlying:
             y += h * dot(_WEIGHTS, [V * math.sin(angle) for V, angle in zip(speeds, headings, strict=True)])
             psi += h * dot(_WEIGHTS, rates)
         north, east = self._level.carried(period)
-        bank, V = motion.output, self._nominal + self._change
+        bank, V = propagator.output, self._nominal + self._change
         rate = GRAVITY * math.tan(bank) / V
-        self.state = self._level.state(x + north, y + east, V, wrap(psi), rate, bank, motion.slope, command)
+        self.state = self._level.state(x + north, y + east, V, wrap(psi), rate, bank, propagator.slope, command)
 
 
 def bank_of(heading_rate: float, airspeed: float, limit: float) -> float:

@@ -1,8 +1,10 @@
 """A plant: everything below the heading-rate command."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Annotated, Protocol
 
 from annotated_types import Ge
@@ -14,7 +16,7 @@ from harness.world.air import Air
 
 
 class Outcome(StrEnum):
-    """How a flight ended. The first four are results, the rest are failures."""
+    """How a flight ended. The first four are results, the last three are failures of the computation."""
 
     COMPLETED = "completed"
     GROUND = "ground"
@@ -26,7 +28,26 @@ class Outcome(StrEnum):
 
     @property
     def failed(self) -> bool:
+        """Whether the computation failed, so that the flight says nothing about the aircraft or the law."""
         return self in (Outcome.INVALID, Outcome.TIMEOUT, Outcome.WORKER_DIED)
+
+    @property
+    def sentence(self) -> str:
+        """The outcome as a sentence without its full stop: a reason may follow after a colon."""
+        return _SENTENCES[self]
+
+
+_SENTENCES: Mapping[Outcome, str] = MappingProxyType(
+    {
+        Outcome.COMPLETED: "The flight lasted its full duration",
+        Outcome.GROUND: "The aircraft came too close to the ground",
+        Outcome.DEPARTED: "The aircraft departed from controlled flight",
+        Outcome.TARGET_LOST: "The aircraft lost the target",
+        Outcome.INVALID: "The flight failed: a computed value is not valid",
+        Outcome.TIMEOUT: "The flight failed: it took too long to compute",
+        Outcome.WORKER_DIED: "The flight failed: the process that computed it died",
+    }
+)
 
 
 class End(Exception):  # noqa: N818 - an end is not an error

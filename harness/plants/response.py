@@ -1,4 +1,4 @@
-"""A linear response of gain one to a held and delayed command, and its exact motion between commands."""
+"""A linear response of gain one to a held and delayed command, and its exact propagation between commands."""
 
 import math
 from collections import deque
@@ -140,7 +140,7 @@ class Piece(NamedTuple):
     end: Rows  # of the states at the end
 
 
-class Motion:
+class Propagator:
     """A response in motion: exact while the command is held, whatever the delay. Times are counted in nanoseconds."""
 
     def __init__(self, response: Response, nodes: int) -> None:

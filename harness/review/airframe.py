@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.flight import Flight
-from harness.review.shown import Colour, mixed
+from harness.review.styled import Colour, mixed
 
 Array = NDArray[np.float64]
 Corner = tuple[float, float, float]

@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.plants.turn import banks_of_turns
 from harness.review.plots import DEG, Array, Plot, Series, end, finite, level, span
-from harness.review.shown import Shown
+from harness.review.styled import StyledFlight
 
 _DIFFERENCES = (
     ("range_error", "Range error", "m", 1.0),
@@ -16,7 +16,7 @@ _DIFFERENCES = (
 )
 
 
-def difference_plots(flights: Sequence[Shown]) -> list[Plot]:
+def difference_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
     """Flight minus reference for as long as both fly; none of a flight alone.
 
     A reference without bank and sideslip turns as the paper assumes: banked by atan(V heading_rate / g), no sideslip.
@@ -32,14 +32,14 @@ def difference_plots(flights: Sequence[Shown]) -> list[Plot]:
     return plots
 
 
-def _difference(column: str, scale: float, one: Shown, reference: Shown) -> Series:
+def _difference(column: str, scale: float, one: StyledFlight, reference: StyledFlight) -> Series:
     both = one.log["time"][one.log["time"] <= reference.log["time"][-1]] if len(reference.log) else np.empty(0)
     expected = np.interp(both, reference.log["time"], _expected(column, reference)) if len(both) else both
     values = scale * (one.log[column][: len(both)] - expected)
     return Series((one.name,), (one.colour,), (one.width,), both, values[:, np.newaxis])
 
 
-def _expected(column: str, reference: Shown) -> Array:
+def _expected(column: str, reference: StyledFlight) -> Array:
     log = reference.log
     values = log[column]
     if not np.isnan(values).all():

@@ -12,7 +12,7 @@ import aircraft
 from harness.log import FlightLog
 from harness.metric import settling_time
 from harness.plants.plant import Outcome
-from harness.review.shown import Colour
+from harness.review.styled import Colour
 
 WINDOW = 1.0  # s: a lane tells of windows this long, so that a command that chatters can be read
 MOST_EVENTS = 15  # of one lane; a lane that changes more often is told as one event

@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 from harness.review.plots import Plot
 from harness.review.recorder import Recorder
 from harness.review.scene import chase_view, scene_view
-from harness.review.shown import WORDS, Shown
+from harness.review.styled import WORDS, StyledFlight
 
 _RIGHT = 950.0  # points: width of the column of plots in a window 1600 wide
 _HEIGHT = 870.0  # points: height of all tabs in a window 1000 high
@@ -25,7 +25,7 @@ Tab = rrb.Container | rrb.View
 class Content(NamedTuple):
     """All that there is to lay out."""
 
-    flights: Sequence[Shown]
+    flights: Sequence[StyledFlight]
     overview: Sequence[Plot]
     differences: Sequence[Plot]
     aircraft: Sequence[Plot]
@@ -178,7 +178,7 @@ def _gutter(plots: Sequence[Plot], width: float) -> float:
     return min(0.5, (_BESIDE_LETTERS + _LETTER * longest) / (width - _AXIS))
 
 
-def _coloured(plot: Plot, flights: Sequence[Shown]) -> str:
+def _coloured(plot: Plot, flights: Sequence[StyledFlight]) -> str:
     """The title with the colours in words: where the curves fill the plot, a legend would lie on them."""
     if len(flights) == 1:
         shades = ("dim", "pale", WORDS[flights[0].colour])

@@ -13,7 +13,7 @@ from harness.review.plots import Plot
 from harness.review.recorder import Recorder
 from harness.review.recording import content_of, log_lane, log_story, log_style, log_values
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_trail
-from harness.review.shown import Shown, shown
+from harness.review.styled import StyledFlight, styled
 from harness.review.viewer import PORT, ViewerError, address, listening
 
 _EVERY = 0.1  # s, on the clock: between two parcels
@@ -52,7 +52,7 @@ class Live:
         if self.gone:
             return
         self._send(log)
-        one = shown({self._name: log})
+        one = styled({self._name: log})
         self._close_lanes(log)
         log_story(self._to, one, self._title, "", command)
         self._flush()
@@ -61,7 +61,7 @@ class Live:
 
     def _send(self, log: FlightLog) -> None:
         """The rows since the last parcel."""
-        (one,) = shown({self._name: log})
+        (one,) = styled({self._name: log})
         new = FlightLog(log.flight, log.outcome, log.reason, log.table[self._sent :])
         if not len(new):
             return
@@ -80,7 +80,7 @@ class Live:
             self._send_lanes(log)
         self._flush()
 
-    def _open(self, one: Shown, content: Content) -> None:
+    def _open(self, one: StyledFlight, content: Content) -> None:
         """The layout for the whole flight, though it has just begun."""
         self._to.layout(layout(content._replace(until=one.log.flight.duration, growing=True)))
         self._to.stream.send_recording_name(self._title)

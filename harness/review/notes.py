@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from functools import cache
 
 from harness.feasibility import feasibility_line, warnings
-from harness.key import PHYSICS, flight_key
+from harness.key import PHYSICS_VERSION, flight_key
 from harness.log import FlightLog
 from harness.metric import MEANING, metrics
 from harness.provenance import packages
-from harness.review.shown import Shown
+from harness.review.styled import StyledFlight
 from harness.settings import document
 from harness.settings.columns import by_column
 from harness.tables import number
@@ -18,7 +18,7 @@ from harness.tables import number
 _packages = cache(packages)
 
 
-def result_notes(flights: Sequence[Shown], title: str, above: str, command: str) -> str:
+def result_notes(flights: Sequence[StyledFlight], title: str, above: str, command: str) -> str:
     """What came out, a column per flight, and how to get it again."""
     parts = [f"# {title}"]
     parts += [above] if above else []
@@ -39,9 +39,14 @@ def result_notes(flights: Sequence[Shown], title: str, above: str, command: str)
     return "\n\n".join(parts)
 
 
-def settings_notes(flights: Sequence[Shown]) -> str:
+def settings_notes(flights: Sequence[StyledFlight]) -> str:
     """Provenance of the recording, the settings of the first flight whole, and of the others what differs."""
-    made_with = {**_packages(), "physics": str(PHYSICS), "python": platform.python_version(), "on": platform.platform()}
+    made_with = {
+        **_packages(),
+        "physics": str(PHYSICS_VERSION),
+        "python": platform.python_version(),
+        "on": platform.platform(),
+    }
     parts = ["## Provenance", _table([["what", "version"], *([name, value] for name, value in made_with.items())])]
     parts.append(
         _table([["flight", "key", "digest"], *([f.name, flight_key(f.log.flight), f.log.digest] for f in flights)])

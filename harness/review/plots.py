@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.review.shown import GREY, LIGHT, Colour, Shown, mixed
+from harness.review.styled import GREY, LIGHT, Colour, StyledFlight, mixed
 
 Array = NDArray[np.float64]
 
@@ -102,12 +102,12 @@ _AIRCRAFT = (
 _SHADES: tuple[tuple[Colour, float], ...] = ((LIGHT, 0.0), (LIGHT, 0.65), (_DIM, 0.8))  # of a flight's lines
 
 
-def overview_plots(flights: Sequence[Shown]) -> list[Plot]:
+def overview_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
     """What the law does and what the aircraft makes of it. A column that a plant has not is left out."""
     return [plot for content in _OVERVIEW if (plot := _plot(content, flights))]
 
 
-def aircraft_plots(flights: Sequence[Shown]) -> list[Plot]:
+def aircraft_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
     """The aircraft itself and the air around it; of several flights each line has its own plot, unless it is zero."""
     if len(flights) == 1:
         return [plot for content in _AIRCRAFT if (plot := _plot(content, flights))]
@@ -116,7 +116,7 @@ def aircraft_plots(flights: Sequence[Shown]) -> list[Plot]:
     return [plot for plot in plots if any(np.nan_to_num(series.values).any() for series in plot.series)]
 
 
-def end(flights: Sequence[Shown]) -> float:
+def end(flights: Sequence[StyledFlight]) -> float:
     """The time of the last row, s; above zero."""
     return max((float(one.log["time"][-1]) for one in flights if len(one.log)), default=0.0) or 1.0
 
@@ -176,7 +176,7 @@ def _split(content: _Content) -> list[_Content]:
     ]
 
 
-def _plot(content: _Content, flights: Sequence[Shown]) -> Plot | None:
+def _plot(content: _Content, flights: Sequence[StyledFlight]) -> Plot | None:
     flown = [kept for one in flights if (kept := finite(_series(content, one, len(flights))))]
     if not flown:
         return None
@@ -184,7 +184,7 @@ def _plot(content: _Content, flights: Sequence[Shown]) -> Plot | None:
     return Plot(content.name, f"{content.title} [{content.unit}]", series, _span(content, series, flights))
 
 
-def _series(content: _Content, one: Shown, flights: int) -> Series:
+def _series(content: _Content, one: StyledFlight, flights: int) -> Series:
     lines = content.lines if flights == 1 else content.lines[-2 if flights <= MOST_WITH_COMMANDS else -1 :]
     names = [line.label if flights == 1 else _name(one.name, line, lines) for line in lines]
     shades = reversed(_SHADES[: len(lines)])
@@ -198,7 +198,7 @@ def _name(flight: str, line: _Line, lines: Sequence[_Line]) -> str:
     return flight if line is lines[-1] else f"{flight} {line.label}"
 
 
-def _bounds(name: str, flights: Sequence[Shown]) -> list[Series]:
+def _bounds(name: str, flights: Sequence[StyledFlight]) -> list[Series]:
     """What the values are to be compared with, where it is the same at all times."""
     several = [one.log.flight for one in flights]
     if name == "range_error":
@@ -219,7 +219,7 @@ def _bounds(name: str, flights: Sequence[Shown]) -> list[Series]:
     ]
 
 
-def _span(content: _Content, series: Sequence[Series], flights: Sequence[Shown]) -> tuple[float, float]:
+def _span(content: _Content, series: Sequence[Series], flights: Sequence[StyledFlight]) -> tuple[float, float]:
     """All of a curve, but of the range error before half-time what is near, and of heading rates the limit's."""
     if content.name == "range_error":
         near = max(0.5 * one.log.flight.law.standoff for one in flights)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from harness.files import whole
+from harness.files import replacing
 from harness.log import COLUMNS, FlightLog
 from harness.review.differences import difference_plots
 from harness.review.lanes import COLOURS, Change, events, lanes, summary
@@ -16,7 +16,7 @@ from harness.review.notes import kept, result_notes, settings_notes
 from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
-from harness.review.shown import Shown, shown
+from harness.review.styled import StyledFlight, styled
 from harness.review.target_plots import target_plots
 
 Logs = Mapping[str, FlightLog]
@@ -32,11 +32,11 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command
         content = _encoded(logs, title, notes, command)
     finally:
         clean_up()
-    with whole(path) as partial:
+    with replacing(path) as partial:
         partial.write_bytes(content)
 
 
-def content_of(flights: Sequence[Shown], lanes: int) -> Content:
+def content_of(flights: Sequence[StyledFlight], lanes: int) -> Content:
     """What is drawn of these flights, beside that many lanes."""
     return Content(
         flights,
@@ -96,7 +96,7 @@ def log_lane(to: Recorder, lane: str, changes: Sequence[Change]) -> None:
     to.columns(entity, times, rr.StateChange.columns(state=[change.state for change in changes]))
 
 
-def log_story(to: Recorder, flights: Sequence[Shown], title: str, notes: str, command: str) -> None:
+def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: str, command: str) -> None:
     """What can be told when the flights are over: modes, events, whole tracks, results and settings."""
     several = len(flights) > 1
     for i, one in enumerate(flights):
@@ -120,7 +120,7 @@ def log_story(to: Recorder, flights: Sequence[Shown], title: str, notes: str, co
 
 def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     """The file's content. Made in memory: Rerun's own file sink waits for ever when the disk is full."""
-    flights = shown(logs)
+    flights = styled(logs)
     content = content_of(flights, len(flights) if len(flights) > 1 else len(lanes(flights[0].log)))
     to = Recorder()
     memory = to.stream.memory_recording()

@@ -13,7 +13,7 @@ from harness.flight import Flight
 from harness.log import FlightLog
 from harness.review.airframe import airframe, size
 from harness.review.recorder import Recorder
-from harness.review.shown import ESTIMATE, TARGET, WIND, Colour, Shown, mixed
+from harness.review.styled import ESTIMATE, TARGET, WIND, Colour, StyledFlight, mixed
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def log_target(to: Recorder, log: FlightLog) -> None:
         to.columns("/target/estimate", log["time"][new], where)
 
 
-def log_tracks(to: Recorder, one: Shown, whole: FlightLog) -> None:
+def log_tracks(to: Recorder, one: StyledFlight, whole: FlightLog) -> None:
     """What is known when the flight is over: the whole way of the aircraft and of the target, and how it ended."""
     entity = to.flight(one.name)
     faint = mixed(one.colour, _BLACK, 0.35)
@@ -65,7 +65,7 @@ def log_tracks(to: Recorder, one: Shown, whole: FlightLog) -> None:
         to.once(f"{entity}/end", _label(_track(whole)[-1:], one.colour, 5.0, whole.outcome.value))
 
 
-def log_airframe(to: Recorder, one: Shown, flights: Sequence[Shown]) -> None:
+def log_airframe(to: Recorder, one: StyledFlight, flights: Sequence[StyledFlight]) -> None:
     """The aircraft's shape from its span and chord: `far` enlarged for the scene, `near` for the chase view."""
     entity = to.flight(one.name)
     to.once(f"{entity}/vehicle/body/far", airframe(one.log.flight, enlargement(flights), one.colour))
@@ -76,7 +76,7 @@ def log_airframe(to: Recorder, one: Shown, flights: Sequence[Shown]) -> None:
         to.once("/target/estimate/label", _label([beside], ESTIMATE, 0.1, "estimate"))
 
 
-def log_motion(to: Recorder, one: Shown, rows: FlightLog) -> None:
+def log_motion(to: Recorder, one: StyledFlight, rows: FlightLog) -> None:
     """The aircraft's pose at each row: level on its track, and banked within that."""
     entity, some = to.flight(one.name), _every(_MOVES, rows)
     yaw = np.where(np.isnan(rows["yaw"]), rows["heading"], rows["yaw"])[some]  # without a nose, along its heading
@@ -89,7 +89,7 @@ def log_motion(to: Recorder, one: Shown, rows: FlightLog) -> None:
         to.columns(f"{entity}/vehicle/body", rows["time"][some], banked)
 
 
-def log_trail(to: Recorder, one: Shown, rows: FlightLog) -> int:
+def log_trail(to: Recorder, one: StyledFlight, rows: FlightLog) -> int:
     """The way behind the aircraft in whole pieces of a second; gives the row that the last of them ends at."""
     piece = max(1, round(_STRIP / rows.flight.guidance_period))
     ends = np.arange(piece, len(rows), piece)
@@ -102,7 +102,7 @@ def log_trail(to: Recorder, one: Shown, rows: FlightLog) -> int:
     return int(ends[-1])
 
 
-def scene_view(flights: Sequence[Shown], aspect: float, name: str = "Scene") -> rrb.Spatial3DView:
+def scene_view(flights: Sequence[StyledFlight], aspect: float, name: str = "Scene") -> rrb.Spatial3DView:
     """Seen from the south and from above, just far enough to see everything; `aspect` is width over height."""
     reference = flights[0].log
     ground = _ground(reference)[::-20] if len(reference) else np.array([(*reference.flight.target.position, 0.0)])
@@ -134,7 +134,7 @@ def scene_view(flights: Sequence[Shown], aspect: float, name: str = "Scene") -> 
     )
 
 
-def chase_view(one: Shown, flights: Sequence[Shown]) -> rrb.Spatial3DView:
+def chase_view(one: StyledFlight, flights: Sequence[StyledFlight]) -> rrb.Spatial3DView:
     """Behind and above the aircraft, turning with it, its horizon level."""
     entity = Recorder.flight(one.name)
     span = _NEAR * size(one.log.flight)[0]
@@ -155,7 +155,7 @@ def chase_view(one: Shown, flights: Sequence[Shown]) -> rrb.Spatial3DView:
     )
 
 
-def enlargement(flights: Sequence[Shown]) -> float:
+def enlargement(flights: Sequence[StyledFlight]) -> float:
     """How many times its size an aircraft has in the scene: a third of the circle's radius wide, or so."""
     needed = 0.3 * flights[0].log.flight.law.standoff / size(flights[0].log.flight)[0]
     return float(
@@ -169,12 +169,12 @@ def _every(seconds: float, rows: FlightLog) -> NDArray[np.int64]:
     return np.unique(np.append(np.arange(0, len(rows), step), np.arange(len(rows))[-1:])).astype(np.int64)
 
 
-def _below(one: Shown) -> Array:
+def _below(one: StyledFlight) -> Array:
     """How far below its place a line is drawn, m: a thin one that lies on a wide one stays visible."""
     return np.array((0.0, 0.0, 0.5 * (one.width - 1.5)))
 
 
-def _trail_radius(one: Shown) -> float:
+def _trail_radius(one: StyledFlight) -> float:
     return 0.75 + 0.3 * one.width
 
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.review.plots import DEG, Array, Plot, Series, end, finite, level, span
-from harness.review.shown import ESTIMATE, GREY, TARGET, Shown
+from harness.review.styled import ESTIMATE, GREY, TARGET, StyledFlight
 
 _BANDS = 2  # flights with bands; of more, they would hide each other
 _AXES = ("north", "east")
 
 
-def target_plots(flights: Sequence[Shown]) -> list[Plot]:
+def target_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
     """Position and velocity of the target; where a flight estimates them, also the errors and the innovations."""
     estimating = [one for one in flights if one.log.flight.estimator.kind == "ekf" and len(one.log)]
     plots = []
@@ -34,7 +34,7 @@ def _plot(name: str, title: str, series: list[Series]) -> Plot:
     return Plot(name, title, series, span([_near(s) for s in series]))
 
 
-def _position_error(axis: str, estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+def _position_error(axis: str, estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]) -> Plot:
     name = f"target_{axis}"
     series = [level("0", (0.0,), end(flights))]
     for one in estimating:
@@ -43,7 +43,7 @@ def _position_error(axis: str, estimating: Sequence[Shown], flights: Sequence[Sh
     return _plot(f"{name}_error", f"Target {axis}: error of the estimate ± 1σ [m]", series)
 
 
-def _velocity(axis: str, estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+def _velocity(axis: str, estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]) -> Plot:
     name = f"target_velocity_{axis}"
     series = [
         _estimate(one, one.log[f"{name}_seen"], one.log[f"{name}_variance"], "estimate", flights) for one in estimating
@@ -52,7 +52,9 @@ def _velocity(axis: str, estimating: Sequence[Shown], flights: Sequence[Shown]) 
     return _plot(name, f"Target velocity {axis}{band} [m/s]", [*series, _truth(name, flights)])
 
 
-def _innovation(of: str, unit: str, scale: float, estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+def _innovation(
+    of: str, unit: str, scale: float, estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]
+) -> Plot:
     series = [level("0", (0.0,), end(flights))]
     for one in estimating:
         values = scale * one.log[f"innovation_{of}"]
@@ -62,7 +64,7 @@ def _innovation(of: str, unit: str, scale: float, estimating: Sequence[Shown], f
     return _plot(f"innovation_{of}", f"Innovation, {of} [{unit}]", [kept for s in series if (kept := finite(s))])
 
 
-def _range_error_seen(estimating: Sequence[Shown], flights: Sequence[Shown]) -> Plot:
+def _range_error_seen(estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]) -> Plot:
     """What the law believed: its range error from the estimate."""
     series = []
     for one in estimating:
@@ -81,27 +83,29 @@ def _range_error_seen(estimating: Sequence[Shown], flights: Sequence[Shown]) -> 
     )
 
 
-def _measured(one: Shown) -> NDArray[np.bool_]:
+def _measured(one: StyledFlight) -> NDArray[np.bool_]:
     """The rows with a new measurement; between them an estimate only goes on as it was."""
     new = np.isfinite(one.log["innovation_range"])
     new[:1] = True  # the filter starts from the first, which has no innovation
     return new
 
 
-def _estimate(one: Shown, values: Array, variances: Array, label: str, flights: Sequence[Shown]) -> Series:
+def _estimate(
+    one: StyledFlight, values: Array, variances: Array, label: str, flights: Sequence[StyledFlight]
+) -> Series:
     colour, name = _looks(one, label, flights)
     bands = variances[_measured(one), np.newaxis] if len(flights) <= _BANDS else None
     new = _measured(one)
     return Series((name,), (colour,), (one.width,), one.log["time"][new], values[new, np.newaxis], bands)
 
 
-def _truth(column: str, flights: Sequence[Shown]) -> Series:
+def _truth(column: str, flights: Sequence[StyledFlight]) -> Series:
     """The target moves alike in all flights of a comparison; drawn is the longest."""
     longest = max(flights, key=lambda one: len(one.log)).log
     return Series(("truth",), (TARGET,), (1.5,), longest["time"], longest[column][:, np.newaxis])
 
 
-def _looks(one: Shown, label: str, flights: Sequence[Shown]) -> tuple[tuple[int, int, int], str]:
+def _looks(one: StyledFlight, label: str, flights: Sequence[StyledFlight]) -> tuple[tuple[int, int, int], str]:
     return (ESTIMATE, label) if len(flights) == 1 else (one.colour, one.name)
 
 

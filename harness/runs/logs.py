@@ -7,7 +7,7 @@ from harness.log import FlightLog
 from harness.loop import simulate
 from harness.plants.ladder import PLANTS
 from harness.review.reading import read_logs
-from harness.runs.recall import Place, fly_again, recall
+from harness.runs.recall import RowAddress, fly_again, recall
 from harness.runs.recordings import recording_path
 from harness.runs.store import find, on_each_plant
 from harness.settings import SettingsError, document, flight_from_document
@@ -33,7 +33,7 @@ def flight_of_row(folder: Path, beginning: str, say: Say) -> FlightLog:
         pass
     except (OSError, ValueError) as error:
         say(f"{key}: its recording cannot be used ({error}): flown again")
-    recalled = recall(Place(folder, key))
+    recalled = recall(RowAddress(folder, key))
     if not digest:
         say(f"{key}: ended in {stored.row['outcome']} without a log; flown again, there is nothing to compare with")
         return simulate(recalled.flight)
@@ -50,7 +50,7 @@ def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
     """The same flight on each plant, the simplest first; on a plant that the run left out it is flown anew."""
     stored = find(folder, beginning)
     keys = on_each_plant(folder, stored.row["flight"])
-    settings = recall(Place(folder, stored.row["key"])).settings
+    settings = recall(RowAddress(folder, stored.row["key"])).settings
     logs = []
     for plant in PLANTS:
         if plant in keys:

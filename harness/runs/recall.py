@@ -13,24 +13,24 @@ from harness.flight import Flight
 from harness.key import content_hash, version_of
 from harness.log import FlightLog
 from harness.loop import simulate
-from harness.runs.row import Judged, judged
+from harness.runs.row import FlightResult, result_of
 from harness.runs.store import Stored, content, find
 from harness.settings import SettingsFile, flight_from_document, overridden, without_former_names
 
 
-class Place(NamedTuple):
+class RowAddress(NamedTuple):
     """`DIR:KEY`: a row of an earlier run, by the beginning of its key."""
 
     folder: Path
     beginning: str
 
 
-def place_of(text: str) -> Place | None:
+def row_address(text: str) -> RowAddress | None:
     """The row that a word of the command line names; None when it names something else."""
     folder, colon, key = text.rpartition(":")
     if not colon or Path(text).exists() or not Path(folder).is_dir():
         return None
-    return Place(Path(folder), key.strip().lower())
+    return RowAddress(Path(folder), key.strip().lower())
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Recalled:
         return overridden(SettingsFile(Path(name), {"flight": dict(self.settings)}, {}, {}), overrides)
 
 
-def recall(place: Place) -> Recalled:
+def recall(place: RowAddress) -> Recalled:
     """The row and its flight. Files that are gone or have changed come from the store. Raises `StoreError`."""
     stored = find(*place)
     settings = without_former_names(stored.row["flight"])  # a copy
@@ -80,10 +80,10 @@ class Again(NamedTuple):
 def fly_again(recalled: Recalled) -> Again:
     """Flies the row's flight and compares. ValueError when it cannot start."""
     log = simulate(recalled.flight)
-    return Again(log, deviation(recalled.stored, judged(log)))
+    return Again(log, deviation(recalled.stored, result_of(log)))
 
 
-def deviation(stored: Stored, now: Judged) -> str:
+def deviation(stored: Stored, now: FlightResult) -> str:
     """By how much a flight is not the row's, in words: at its end, and in the metric that differs most."""
     then = stored.row
     if then["digest"] == now.digest:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.files import whole
+from harness.files import replacing
 from harness.metric import MEANING
 from harness.runs.store import reading
 from harness.settings.columns import by_column
@@ -47,7 +47,7 @@ def export(folder: Path) -> None:
         if _is_current(path, stand):
             return
         table = _table(journal).replace_schema_metadata({_STAND: stand})
-    with whole(path) as partial:
+    with replacing(path) as partial:
         pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
 
 

@@ -13,10 +13,10 @@ from harness.loop import simulate
 from harness.metric import MEANING, metrics
 from harness.plants.plant import Outcome, PlantError
 
-Row = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s
+FlightRow = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s
 
 
-class Judged(NamedTuple):
+class FlightResult(NamedTuple):
     """How a flight went; fit for JSON."""
 
     outcome: str
@@ -27,36 +27,36 @@ class Judged(NamedTuple):
     seconds: float | None  # wall time of the simulation
 
 
-def row_of(log: FlightLog) -> Row:
+def row_of(log: FlightLog) -> FlightRow:
     """The row of a flight; fit for JSON, None where there is no number."""
-    return row(log.flight, identity(log.flight), judged(log))
+    return row(log.flight, identity(log.flight), result_of(log))
 
 
-def row(flight: Flight, of: Identity, how: Judged) -> Row:
+def row(flight: Flight, of: Identity, result: FlightResult) -> FlightRow:
     """The row of a flight that went so."""
     margin = math.degrees(feasibility_margin(flight))
     return {
         "key": of.key,
-        "outcome": how.outcome,
-        "reason": how.reason,
-        "digest": how.digest,
+        "outcome": result.outcome,
+        "reason": result.reason,
+        "digest": result.digest,
         "flight": of.settings,
-        "metrics": how.metrics,
+        "metrics": result.metrics,
         "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # none without a limit
     }
 
 
-def judged(log: FlightLog, seconds: float | None = None) -> Judged:
+def result_of(log: FlightLog, seconds: float | None = None) -> FlightResult:
     """How the flight went."""
-    return Judged(log.outcome.value, log.reason, log.digest, metrics(log), final(log), seconds)
+    return FlightResult(log.outcome.value, log.reason, log.digest, metrics(log), final(log), seconds)
 
 
-def failed(outcome: Outcome, reason: str) -> Judged:
+def failed_result(outcome: Outcome, reason: str) -> FlightResult:
     """A flight that left no log."""
-    return Judged(outcome.value, reason, "", dict.fromkeys(MEANING), {}, None)
+    return FlightResult(outcome.value, reason, "", dict.fromkeys(MEANING), {}, None)
 
 
-def flown(flight: Flight) -> FlightLog:
+def simulate_safely(flight: Flight) -> FlightLog:
     """Flies the flight. What cannot start is an outcome here, `invalid`: one of many must not stop the others."""
     try:
         return simulate(flight)

@@ -8,10 +8,10 @@ from pathlib import Path
 from harness.key import Identity, files, identity, version_of
 from harness.plants.plant import Outcome
 from harness.provenance import provenance
-from harness.runs.estimate import Estimate
 from harness.runs.matrix import Matrix
 from harness.runs.row import row
 from harness.runs.store import JOURNAL, Store, begun, examples, positions, reading
+from harness.runs.wall_time import WallTime
 from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
 
@@ -27,7 +27,7 @@ class Options:
     limit: int | None = None  # the first so many flights of the matrix
     log: str | None = None  # one of LOGS; None: all up to `RECORDED`, else a sample
     retry_failed: bool = False
-    timeout: float | None = None  # s for each flight; None: 20 times its estimate
+    timeout: float | None = None  # s for each flight; None: 20 times its usual wall time
     fly: Fly = fly_task
 
 
@@ -57,10 +57,10 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         count = len(matrix)
         progress = Progress(count if options.limit is None else min(count, options.limit))
         pending: dict[str, Identity] = {}
-        estimate = Estimate()
+        wall_time = WallTime()
         tasks = _tasks(matrix, store, options, progress, pending)
         flying = fly_all(
-            tasks, folder, workers=options.workers, estimate=estimate, timeout=options.timeout, fly=options.fly
+            tasks, folder, workers=options.workers, wall_time=wall_time, timeout=options.timeout, fly=options.fly
         )
         begin = time.monotonic()
         try:
@@ -77,7 +77,7 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
 
 
 def _keep(store: Store, done: Done, of: Identity, progress: Progress) -> None:
-    task, (how, version, problem) = done
+    task, (result, version, problem) = done
     if version != task.version:
         raise WorkersError(
             "a law, an airframe or a track has changed while flights were flown: run the same command again"
@@ -85,11 +85,11 @@ def _keep(store: Store, done: Done, of: Identity, progress: Progress) -> None:
     if problem:
         progress.recordings.append(problem)
     store.add_version(of.version, files(task.flight))
-    store.add(row(task.flight, of, how), how, version, task.position)
+    store.add(row(task.flight, of, result), result, version, task.position)
     progress.done += 1
-    if Outcome(how.outcome).failed:
+    if Outcome(result.outcome).failed:
         progress.failed += 1
-        reason = f"{how.outcome}: {how.reason}"
+        reason = f"{result.outcome}: {result.reason}"
         progress.reasons[reason] = progress.reasons.get(reason, 0) + 1
 
 

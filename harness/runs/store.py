@@ -15,7 +15,7 @@ from harness.error import HarnessError
 from harness.key import Version, content_hash
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
-from harness.runs.row import Judged, Row
+from harness.runs.row import FlightResult, FlightRow
 
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
 COMMIT_EVERY = 0.5  # s
@@ -53,7 +53,7 @@ class StoreError(HarnessError):
 class Stored(NamedTuple):
     """A row as it is kept."""
 
-    row: Row  # as `fly --json` prints it
+    row: FlightRow  # as `fly --json` prints it
     final: Mapping[str, float]  # the flight's last state, see `harness.runs.row`
     seconds: float | None  # wall time of the simulation
     version: Mapping[str, Any]  # what decided it beside its settings: see `harness.key`
@@ -74,7 +74,7 @@ class Store:
         except OSError as error:
             raise StoreError(f"{folder}: cannot be written: {error.strerror or error}") from None
         try:
-            with told(folder):
+            with _store_errors(folder):
                 fresh = not (folder / JOURNAL).exists()
                 self._journal = sqlite3.connect(folder / JOURNAL, timeout=_WAIT, isolation_level=None)
                 if not fresh:
@@ -129,7 +129,7 @@ class Store:
         self._change("INSERT INTO versions VALUES (?, ?)", (version.number, json.dumps(version.decides)))
         self._versions.add(version.number)
 
-    def add(self, row: Row, how: Judged, version: str, position: int) -> None:
+    def add(self, row: FlightRow, result: FlightResult, version: str, position: int) -> None:
         """Keeps a row, for good within half a second."""
         self._grown = True
         self._change(
@@ -137,7 +137,7 @@ class Store:
             (
                 row["key"], self._run, position, version, row["outcome"], row["reason"], row["digest"],
                 json.dumps(row["flight"]), json.dumps(row["metrics"]), row["feasibility_margin_deg_s"],
-                how.seconds, json.dumps(how.final),
+                result.seconds, json.dumps(result.final),
             ),
         )  # fmt: skip
 
@@ -152,7 +152,7 @@ class Store:
     def commit(self) -> None:
         """Writes what is not written yet."""
         if self._begun is not None:
-            with told(self.folder):
+            with _store_errors(self.folder):
                 if self._grown:
                     self._journal.execute("UPDATE changes SET number = number + 1")
                 self._journal.execute("COMMIT")
@@ -164,7 +164,7 @@ class Store:
             self.commit()
 
     def _change(self, statement: str, values: Iterable[object]) -> None:
-        with told(self.folder):
+        with _store_errors(self.folder):
             if self._begun is None:
                 self._journal.execute("BEGIN IMMEDIATE")
                 self._begun = time.monotonic()
@@ -172,7 +172,7 @@ class Store:
         self.tick()
 
     def _all(self, statement: str, values: Iterable[object] = ()) -> list[Any]:
-        with told(self.folder):
+        with _store_errors(self.folder):
             return self._journal.execute(statement, tuple(values)).fetchall()
 
 
@@ -182,7 +182,7 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
     path = folder / JOURNAL
     if not path.is_file():
         raise StoreError(f"{folder}: holds no results of `harness run` (there is no {JOURNAL})")
-    with told(folder):
+    with _store_errors(folder):
         # Opened for writing where that is allowed: a run that was killed left half a commit, to be rolled back first.
         mode = "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
         journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=_WAIT)
@@ -279,7 +279,7 @@ def content(folder: Path, digest: str) -> bytes:
 
 
 @contextmanager
-def told(folder: Path) -> Iterator[None]:
+def _store_errors(folder: Path) -> Iterator[None]:
     """SQLite's errors as a `StoreError` that says what to do."""
     try:
         yield

@@ -7,21 +7,12 @@ from typing import Any
 
 from harness.metric import MEANING
 from harness.plants.ladder import PLANTS
+from harness.plants.plant import Outcome
 from harness.runs.recordings import recording_path
 from harness.runs.store import Stored
 from harness.settings import document, flight_from_document
 from harness.settings.columns import by_column
 from harness.tables import number
-
-_ENDED = {
-    "completed": "It flew to its end.",
-    "ground": "It ended on the ground",
-    "departed": "It departed from controlled flight",
-    "target_lost": "It lost the target",
-    "invalid": "It failed: what it computed is not valid",
-    "timeout": "It failed: it took too long",
-    "worker_died": "It failed: the process that flew it died",
-}
 
 
 def story(folder: Path, stored: Stored) -> Iterator[str]:
@@ -44,8 +35,8 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
     margin = row["feasibility_margin_deg_s"]
     if margin is not None:
         yield f"The circle is {'feasible' if margin >= 0 else 'INFEASIBLE'}, by a margin of {margin:+.2f} deg/s."
-    reason = f": {row['reason']}." if row["reason"] else ""
-    yield f"{_ENDED[row['outcome']]}{reason}"
+    reason = f": {row['reason']}" if row["reason"] else ""
+    yield f"{Outcome(row['outcome']).sentence}{reason}."
     converged = row["metrics"]["convergence_time_s"]
     if row["outcome"] == "completed":
         tolerance = settings["metrics"]["tolerance_m"]

@@ -7,8 +7,8 @@ from harness.checks import try_start
 from harness.feasibility import feasibility_margin
 from harness.flight import Flight
 from harness.plants.plant import PlantError
-from harness.runs.estimate import guess
 from harness.runs.matrix import Combination, Matrix
+from harness.runs.wall_time import typical_wall_time
 from harness.settings import SettingsError
 
 _ROW_BYTES = 4500  # in the journal and in flights.parquet
@@ -113,7 +113,7 @@ class _Seen:
 def _one(flight: Flight) -> _One:
     random = flight.estimator.kind != "truth" or flight.wind.turbulence != "none"
     start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
-    return _One(feasibility_margin(flight) < 0, random, guess(flight), flight.periods, start)
+    return _One(feasibility_margin(flight) < 0, random, typical_wall_time(flight), flight.periods, start)
 
 
 def _try_start(matrix: Matrix, combination: Combination) -> None:

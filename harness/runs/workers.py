@@ -27,8 +27,8 @@ from harness.error import HarnessError
 from harness.flight import Flight
 from harness.key import version_of
 from harness.plants.plant import Outcome
-from harness.runs.estimate import CHUNK, Estimate
-from harness.runs.row import Judged, failed, flown, judged
+from harness.runs.row import FlightResult, failed_result, result_of, simulate_safely
+from harness.runs.wall_time import CHUNK, WallTime
 
 THREADS = (
     "OMP_NUM_THREADS",
@@ -62,10 +62,10 @@ class Task(NamedTuple):
     record: str  # when to write a recording: all | failed | none
 
 
-class Flown(NamedTuple):
+class WorkerResult(NamedTuple):
     """What a worker answers."""
 
-    how: Judged
+    result: FlightResult
     version: str  # as it was when the flight had been flown
     recording: str = ""  # what went wrong with writing it, if anything
 
@@ -74,27 +74,27 @@ class Done(NamedTuple):
     """A task, and how it went."""
 
     task: Task
-    flown: Flown
+    flown: WorkerResult
 
 
-Fly = Callable[[Task, Path], Flown]
+Fly = Callable[[Task, Path], WorkerResult]
 
 
-def fly_task(task: Task, folder: Path) -> Flown:
+def fly_task(task: Task, folder: Path) -> WorkerResult:
     """In a worker: flies it, and writes its recording when asked to."""
     begin = time.perf_counter()
-    log = flown(task.flight)
-    how = judged(log, time.perf_counter() - begin)
+    log = simulate_safely(task.flight)
+    result = result_of(log, time.perf_counter() - begin)
     problem = ""
     if task.record == "all" or (task.record == "failed" and log.outcome is not Outcome.COMPLETED):
         from harness.runs.recordings import record
 
         problem = record(log, task.key, folder)
-    return Flown(how, version_of(task.flight).number, problem)
+    return WorkerResult(result, version_of(task.flight).number, problem)
 
 
 def _failed(task: Task, outcome: Outcome, reason: str) -> Done:
-    return Done(task, Flown(failed(outcome, reason), task.version))
+    return Done(task, WorkerResult(failed_result(outcome, reason), task.version))
 
 
 @dataclass(slots=True)
@@ -111,7 +111,7 @@ def fly_all(
     folder: Path,
     *,
     workers: int,
-    estimate: Estimate,
+    wall_time: WallTime,
     timeout: float | None = None,
     fly: Fly = fly_task,
 ) -> Generator[Done | None]:
@@ -124,19 +124,19 @@ def fly_all(
         for task in tasks:
             yield Done(task, fly(task, folder))
         return
-    yield from _Flying(tasks, folder, workers, estimate, timeout, fly).results()
+    yield from _Flying(tasks, folder, workers, wall_time, timeout, fly).results()
 
 
 class _Flying:
     """The state of `fly_all`."""
 
     def __init__(
-        self, tasks: Iterator[Task], folder: Path, workers: int, estimate: Estimate, timeout: float | None, fly: Fly
+        self, tasks: Iterator[Task], folder: Path, workers: int, wall_time: WallTime, timeout: float | None, fly: Fly
     ) -> None:
         self.tasks, self.folder, self.workers, self.timeout, self.fly = tasks, folder, workers, timeout, fly
-        self.estimate = estimate
+        self.wall_time = wall_time
         self.again: deque[_Chunk] = deque()  # to be flown again
-        self.out: dict[Future[list[Flown | str]], _Chunk] = {}
+        self.out: dict[Future[list[WorkerResult | str]], _Chunk] = {}
         # For each slot: the number of the flight in its chunk, and since when (the monotonic clock is the machine's).
         # A worker that is being ended may still write to its slot: there are enough to use that one last.
         slots = 16 * AHEAD * workers
@@ -228,7 +228,7 @@ class _Flying:
         seconds = 0.0
         while seconds < CHUNK and len(tasks) < _MOST_TASKS and (task := next(self.tasks, None)) is not None:
             tasks.append(task)
-            seconds += self.estimate.seconds(task.flight)
+            seconds += self.wall_time.seconds(task.flight)
         return _Chunk(tasks) if tasks else None
 
     def _end_hung(self) -> None:
@@ -242,10 +242,10 @@ class _Flying:
                 future.cancel()  # Pebble ends the worker of a cancelled task that runs
 
     def _limit(self, task: Task) -> float:
-        limit = self.timeout or max(SHORTEST_TIMEOUT, 20.0 * self.estimate.seconds(task.flight))
+        limit = self.timeout or max(SHORTEST_TIMEOUT, 20.0 * self.wall_time.seconds(task.flight))
         return limit + (_RECORDING if task.record != "none" else 0.0)
 
-    def _received(self, chunk: _Chunk, future: Future[list[Flown | str]]) -> Iterator[Done]:
+    def _received(self, chunk: _Chunk, future: Future[list[WorkerResult | str]]) -> Iterator[Done]:
         try:
             answers = future.result()
         except BrokenProcessPool:
@@ -260,7 +260,7 @@ class _Flying:
             if isinstance(answer, str):
                 yield _failed(task, Outcome.INVALID, answer)
             else:
-                self.estimate.learn(task.flight, answer.how.seconds or 0.0)
+                self.wall_time.learn(task.flight, answer.result.seconds or 0.0)
                 yield Done(task, answer)
 
     def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:
@@ -301,11 +301,11 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _fly_chunk(slot: int, message: bytes) -> list[Flown | str]:
+def _fly_chunk(slot: int, message: bytes) -> list[WorkerResult | str]:
     """The answer to each task of a message, or what went wrong with it."""
     tasks: list[Task] = pickle.loads(zlib.decompress(message))
     begun, folder, fly = _SHARED["begun"], _SHARED["folder"], _SHARED["fly"]
-    answers: list[Flown | str] = []
+    answers: list[WorkerResult | str] = []
     for number, task in enumerate(tasks):
         begun[2 * slot + 1] = time.monotonic()
         begun[2 * slot] = float(number)

@@ -14,7 +14,7 @@ import aircraft
 from autopilot.laws import law
 from autopilot.nftsm import Nftsm
 from harness.drawing import draw
-from harness.files import whole
+from harness.files import replacing
 from harness.identification.fit import fit
 from harness.identification.identify import of_heading_rate
 from harness.identification.manoeuvres import STEP, flown, held
@@ -280,7 +280,7 @@ def main() -> None:
         "images/limit_cycle.svg": map_figure(borders),
         "limit_cycle.md": document(list(rows()), borders),
     }.items():
-        with whole(docs / name) as partial:
+        with replacing(docs / name) as partial:
             partial.write_text(content, encoding="utf-8")
 
 

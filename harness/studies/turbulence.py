@@ -14,7 +14,7 @@ from scipy.signal import welch
 from scipy.stats import binomtest
 
 from harness.drawing import draw
-from harness.files import whole
+from harness.files import replacing
 from harness.runs.results import load_results
 from harness.world.air import Array
 from harness.world.turbulence import dryden, turbulence
@@ -124,7 +124,7 @@ def main(runs: Sequence[str]) -> None:
         DOCUMENT: f"{before}{begin}{table}\n{end}{after}",
         FIGURE: draw(paint, 9.0, 4.8),
     }.items():
-        with whole(path) as partial:
+        with replacing(path) as partial:
             partial.write_text(content, encoding="utf-8")
 
 

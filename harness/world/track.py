@@ -19,21 +19,21 @@ LARGEST = 1e9  # s or m
 
 _SLOWEST = 1e-6  # m/s: a slower target has no direction
 _Row = tuple[float, float, float]
-Motion = tuple[float, float, float, float, float, float]  # north, east, their rates, that of the speed, turn rate
+TargetMotion = tuple[float, float, float, float, float, float]  # north, east, their rates, that of the speed, turn rate
 
 
 class TrackError(HarnessError, ValueError):
     """What is wrong with a track, in one line: `FILE:LINE: what`."""
 
 
-class Piece(NamedTuple):
+class Cubic(NamedTuple):
     """The track from `begin` to the next row: cubics in the time since, the highest power's coefficient first."""
 
     begin: float
     north: list[float]
     east: list[float]
 
-    def at(self, time: float) -> Motion:
+    def at(self, time: float) -> TargetMotion:
         t = time - self.begin
         (x3, x2, x1, x0), (y3, y2, y1, y0) = self.north, self.east
         v_x, v_y = (3.0 * x3 * t + 2.0 * x2) * t + x1, (3.0 * y3 * t + 2.0 * y2) * t + y1
@@ -48,13 +48,13 @@ class Piece(NamedTuple):
 class Track:
     """The whole curve. The flight begins at time 0 and must end by `end`, s."""
 
-    def __init__(self, pieces: list[Piece], end: float) -> None:
-        self.begins, self.end = [piece.begin for piece in pieces], end
-        self._pieces = pieces
+    def __init__(self, cubics: list[Cubic], end: float) -> None:
+        self.begins, self.end = [cubic.begin for cubic in cubics], end
+        self._cubics = cubics
 
-    def at(self, time: float) -> Motion:
+    def at(self, time: float) -> TargetMotion:
         """The target's motion at `time`, s. SI, rad, turning clockwise."""
-        return self._pieces[max(0, bisect_right(self.begins, time) - 1)].at(time)
+        return self._cubics[max(0, bisect_right(self.begins, time) - 1)].at(time)
 
 
 def load_track(path: Path) -> Track:
@@ -77,7 +77,7 @@ def _load(path: Path, modified: int) -> Track:
 
     times, norths, easts = zip(*_rows(path), strict=True)
     north, east = (CubicSpline(times, values).c.T.tolist() for values in (norths, easts))
-    return Track([Piece(*piece) for piece in zip(times[:-1], north, east, strict=True)], times[-1])
+    return Track([Cubic(*cubic) for cubic in zip(times[:-1], north, east, strict=True)], times[-1])
 
 
 def _rows(path: Path) -> list[_Row]:

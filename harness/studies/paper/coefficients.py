@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from autopilot.laws import law
-from harness.files import whole
+from harness.files import replacing
 from harness.studies.paper.experiments import EXPERIMENTS, LAWS, Trace, flight, flown
 from harness.studies.paper.job import workers
 from harness.studies.paper.ledger import metres
@@ -194,7 +194,7 @@ def _off(p: Point) -> float:
 def main(path: Path) -> None:
     """Writes the document."""
     text = document(workers())
-    with whole(path) as partial:
+    with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8")
 
 

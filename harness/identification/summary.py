@@ -11,7 +11,7 @@ BOUND = 0.05  # of the command, RMS: a held-out manoeuvre followed worse is name
 _SHOWN_RAD_S = (0.3, 1.0, 3.0, 10.0)
 
 
-def told(found: Identification) -> Iterator[str]:
+def summary_lines(found: Identification) -> Iterator[str]:
     """What was flown, what was fitted, and how well the one follows the other."""
     known = found.identified
     yield f"{found.airframe.name} at {known.airspeed:g} m/s"

@@ -38,7 +38,7 @@ WORDS: Mapping[Colour, str] = MappingProxyType(
 _WIDE, _THIN = 3.5, 1.5  # points on the screen
 
 
-class Shown(NamedTuple):
+class StyledFlight(NamedTuple):
     """A flight and its looks; the first of several is the reference, drawn wide and pale under the others."""
 
     name: str
@@ -47,7 +47,7 @@ class Shown(NamedTuple):
     width: float
 
 
-def shown(logs: Mapping[str, FlightLog]) -> list[Shown]:
+def styled(logs: Mapping[str, FlightLog]) -> list[StyledFlight]:
     """Flights by name with their looks: a plant keeps its colour where it appears once. ValueError beyond `MOST`."""
     if not 1 <= len(logs) <= MOST:
         raise ValueError(f"{len(logs)} flights: a recording shows 1 to {MOST}")
@@ -56,7 +56,7 @@ def shown(logs: Mapping[str, FlightLog]) -> list[Shown]:
     if len(set(colours)) < len(colours):
         colours = list(_PALETTE[: len(colours)])
     widths = [_WIDE if len(logs) > 1 else _THIN, *[_THIN] * (len(logs) - 1)]
-    return [Shown(*one) for one in zip(logs, logs.values(), colours, widths, strict=True)]
+    return [StyledFlight(*one) for one in zip(logs, logs.values(), colours, widths, strict=True)]
 
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:

@@ -1,4 +1,4 @@
-"""How long flights take: a guess from their length, corrected by those that were flown."""
+"""The wall time that flights take: typical for their length and plant, corrected by those flown so far."""
 
 from harness.flight import Flight
 from harness.plants.ladder import PLANTS
@@ -10,7 +10,7 @@ _BEGIN = 0.003  # of any flight, metrics and digest included
 _FORGETTING = 0.2
 
 
-class Estimate:
+class WallTime:
     """Seconds that flights take on this machine; learns while they are flown."""
 
     def __init__(self) -> None:
@@ -18,15 +18,15 @@ class Estimate:
 
     def seconds(self, flight: Flight) -> float:
         """Wall time of the flight in one process."""
-        return guess(flight) * self._ratio.get(flight.plant, 1.0)
+        return typical_wall_time(flight) * self._ratio.get(flight.plant, 1.0)
 
     def learn(self, flight: Flight, seconds: float) -> None:
         """Takes in how long it took."""
-        ratio, known = seconds / guess(flight), self._ratio.get(flight.plant)
+        ratio, known = seconds / typical_wall_time(flight), self._ratio.get(flight.plant)
         self._ratio[flight.plant] = ratio if known is None else known + _FORGETTING * (ratio - known)
 
 
-def guess(flight: Flight) -> float:
+def typical_wall_time(flight: Flight) -> float:
     """Seconds on a machine like that of `make bench`."""
     seconds, steps = _BEGIN + flight.periods * _PERIOD, flight.duration / flight.step
     cost = PLANTS[flight.plant].cost
