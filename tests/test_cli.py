@@ -3,16 +3,14 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-import aircraft
 from harness.cli._input import BadInput, flight_of, read_file, writable, writable_folder
+from tests.builders import command, copied_airframe, invoke, python, words_of, write
 
 FILE = """\
 [flight]
@@ -28,19 +26,11 @@ steady_mps = [0.0, 0.0]
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    path = tmp_path / "flight.toml"
-    path.write_text(FILE, encoding="utf-8")
-    return path
-
-
-def harness(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "harness", *map(str, words)], capture_output=True, text=True, check=False
-    )
+    return write(tmp_path / "flight.toml", FILE)
 
 
 def test_a_flight_is_told_in_lines(file: Path) -> None:
-    done = harness("fly", file)
+    done = command("fly", file)
     assert done.returncode == 0
     first, *_, outcome, key = done.stdout.splitlines()
     assert first.startswith("circle feasible: holding it takes up to 3.72 deg/s")
@@ -51,7 +41,7 @@ def test_a_flight_is_told_in_lines(file: Path) -> None:
 
 
 def test_json_is_one_object_with_the_contracts_keys(file: Path) -> None:
-    done = harness("fly", file, "--json", "--set", "law.name=smc", "--set", "law.gains=paper")
+    done = command("fly", file, "--json", "--set", "law.name=smc", "--set", "law.gains=paper")
     answer = json.loads(done.stdout)
     assert {"key", "outcome", "digest", "flight", "metrics", "feasibility_margin_deg_s"} <= set(answer)
     assert answer["flight"]["law"]["c1"] == 0.2
@@ -60,13 +50,13 @@ def test_json_is_one_object_with_the_contracts_keys(file: Path) -> None:
 
 
 def test_without_a_limit_json_still_has_no_infinity(file: Path) -> None:
-    done = harness("fly", file, "--json", "--set", "law.max_heading_rate_deg_s=inf")
+    done = command("fly", file, "--json", "--set", "law.max_heading_rate_deg_s=inf")
     assert json.loads(done.stdout)["feasibility_margin_deg_s"] is None
 
 
 def test_another_setting_is_another_key_and_the_same_one_is_not(file: Path) -> None:
     keys = [
-        json.loads(harness("fly", file, "--json", "--set", f"start.heading_deg={heading}").stdout)["key"]
+        json.loads(command("fly", file, "--json", "--set", f"start.heading_deg={heading}").stdout)["key"]
         for heading in (30, 30.0, 31)
     ]
     assert keys[0] == keys[1] != keys[2]
@@ -89,7 +79,7 @@ BAD = [
 
 @pytest.mark.parametrize(("setting", "key", "hint"), BAD)
 def test_a_bad_setting_is_one_line_and_exit_code_2(file: Path, setting: str, key: str, hint: str) -> None:
-    done = harness("fly", file, "--set", setting)
+    done = command("fly", file, "--set", setting)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"--set {setting}: {key}: ")
@@ -97,8 +87,8 @@ def test_a_bad_setting_is_one_line_and_exit_code_2(file: Path, setting: str, key
 
 
 def test_a_mistake_in_the_file_is_told_with_its_line(file: Path) -> None:
-    file.write_text(FILE.replace('"paper_1"', '"papre"'), encoding="utf-8")
-    done = harness("check", file)
+    write(file, FILE.replace('"paper_1"', '"papre"'))
+    done = command("check", file)
     assert done.returncode == 2
     assert done.stderr.startswith(f"{file}:6: flight.law.gains: ")
 
@@ -112,7 +102,7 @@ def test_a_mistake_in_the_file_is_told_with_its_line(file: Path) -> None:
 )
 def test_what_the_airframe_cannot_do_is_one_line_and_exit_code_2(file: Path, settings: list[str], told: str) -> None:
     words = [word for setting in ["plant=sixdof", *settings] for word in ("--set", setting)]
-    done = harness("fly", file, *words)
+    done = command("fly", file, *words)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert told in line
@@ -133,9 +123,7 @@ def test_what_the_airframe_cannot_do_is_one_line_and_exit_code_2(file: Path, set
 def test_a_broken_airframe_is_one_line_that_names_its_file(
     file: Path, broken: str, old: str, new: str | None, told: str
 ) -> None:
-    airframe = file.parent / "plane"
-    shutil.copytree(aircraft.folder("ultra_stick_25e"), airframe)
-    (airframe / "ultra_stick_25e.xml").rename(airframe / "plane.xml")
+    airframe = copied_airframe("ultra_stick_25e", file.parent / "plane")
     flown = ("plant=sixdof", "aircraft=plane")  # beside the settings file
     flight = flight_of(read_file(file, flown))
     assert flight.aircraft == str(airframe)
@@ -144,7 +132,7 @@ def test_a_broken_airframe_is_one_line_that_names_its_file(
         (airframe / broken).unlink()
     else:
         assert old in text
-        (airframe / broken).write_text(text.replace(old, new, 1), encoding="utf-8")
+        write(airframe / broken, text.replace(old, new, 1))
     with pytest.raises(BadInput) as caught:
         flight_of(read_file(file, flown))
     (line,) = caught.value.message.splitlines()
@@ -171,7 +159,7 @@ def test_a_recording_that_cannot_be_written_is_refused_before_the_flight(
     file: Path, tmp_path: Path, where: str
 ) -> None:
     before = sorted(tmp_path.rglob("*"))
-    done = harness("fly", file, "--rrd", tmp_path / where)
+    done = command("fly", file, "--rrd", tmp_path / where)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert done.stdout == ""
@@ -179,7 +167,7 @@ def test_a_recording_that_cannot_be_written_is_refused_before_the_flight(
 
 
 def test_a_law_that_leaves_its_domain_is_flown_with_warnings(file: Path) -> None:
-    done = harness(
+    done = command(
         "fly",
         file,
         "--set",
@@ -202,16 +190,16 @@ def test_help_needs_none_of_the_heavy_libraries() -> None:
         "heavy = {'jsbsim', 'pandas', 'rerun', 'scipy', 'matplotlib', 'numpy', 'pydantic'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python(code)
     assert done.returncode == 0, done.stderr
     assert "Example" in done.stdout
 
 
 @pytest.mark.parametrize(
-    "command", ["fly", "run", "show", "compare", "report", "check", "list", "demo", "reproduce", "doctor"]
+    "name", ["fly", "run", "show", "compare", "report", "check", "list", "demo", "reproduce", "doctor"]
 )
-def test_every_command_shows_an_example(command: str) -> None:
-    assert "Example" in harness(command, "--help").stdout
+def test_every_command_shows_an_example(name: str) -> None:
+    assert "Example" in invoke(name, "--help").stdout
 
 
 @pytest.mark.parametrize(
@@ -227,7 +215,7 @@ def test_every_command_shows_an_example(command: str) -> None:
     ],
 )
 def test_a_mistyped_command_line_is_one_line_and_exit_code_2(words: str, told: str) -> None:
-    done = harness(*words.split())
+    done = command(*words.split())
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert told in line  # after the name by which the command was called
@@ -238,9 +226,7 @@ def test_output_that_nobody_reads_ends_the_command_quietly(file: Path) -> None:
     for words in (("list", "metrics"), ("fly", file, "--set", "law.name=smc", "--set", "law.gains=paper"), ("--help",)):
         reader, writer = os.pipe()
         os.close(reader)
-        done = subprocess.run(
-            [sys.executable, "-m", "harness", *map(str, words)], stdout=writer, stderr=subprocess.PIPE, check=False
-        )
+        done = subprocess.run(words_of(*words), stdout=writer, stderr=subprocess.PIPE, check=False)
         os.close(writer)
         assert done.returncode == 128 + signal.SIGPIPE
         assert not done.stderr
@@ -248,15 +234,13 @@ def test_output_that_nobody_reads_ends_the_command_quietly(file: Path) -> None:
 
 def test_output_for_which_there_is_no_room_is_one_line() -> None:
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "harness", "list", "metrics"], stdout=full, stderr=subprocess.PIPE, check=False
-        )
+        done = subprocess.run(words_of("list", "metrics"), stdout=full, stderr=subprocess.PIPE, check=False)
     assert done.returncode == 2
     assert done.stderr.decode() == "standard output: No space left on device\n"
 
 
 def test_the_doctor_finds_this_installation_sound() -> None:
-    done = harness("doctor")
+    done = command("doctor")
     assert done.returncode == 0, done.stdout
     assert done.stdout.splitlines()[-1] == "sound"
     assert "BAD" not in done.stdout
@@ -264,6 +248,6 @@ def test_the_doctor_finds_this_installation_sound() -> None:
 
 @pytest.mark.parametrize("kind", ["laws", "aircraft", "plants", "metrics", "margins"])
 def test_every_kind_is_listed(kind: str) -> None:
-    done = harness("list", kind)
+    done = command("list", kind)
     assert done.returncode == 0
     assert len(done.stdout.splitlines()) >= 2

@@ -7,21 +7,21 @@ import shutil
 import signal
 import sqlite3
 import subprocess
-import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import harness
 from harness.runs.matrix import read_matrix
-from harness.runs.run import Options, Progress, run
 from harness.runs.store import JOURNAL, StoreError, begun, reading
 from harness.runs.wall_time import typical_wall_time
 from harness.runs.workers import Task, WorkerResult, fly_task
 from harness.settings import read_settings
+from tests.builders import WORKERS, command, digests, fly_matrix, words_of, write
 
 KINEMATIC = """\
 [flight]
@@ -37,29 +37,18 @@ seed = {{ start = 0, count = {count} }}
 
 
 def settings(folder: Path, count: int, duration: float = 2.0, plant: str = "kinematic") -> Path:
-    path = folder / "matrix.toml"
-    path.write_text(KINEMATIC.format(count=count, duration=duration).replace('"kinematic"', f'"{plant}"'))
-    return path
+    text = KINEMATIC.format(count=count, duration=duration).replace('"kinematic"', f'"{plant}"')
+    return write(folder / "matrix.toml", text)
 
 
-def flown(file: Path, out: Path, **options: object) -> Progress:
-    *_, progress = run(read_matrix(read_settings(file)), out, Options(**{"workers": 2, "log": "none", **options}))
-    return progress
+def words(file: Path, out: Path) -> list[object]:
+    return ["run", file, "--out", out, "--workers", 2, "--log", "none"]
 
 
-def words(file: Path, out: Path, *more: object) -> list[str]:
-    run_it = ["run", str(file), "--out", str(out), "--workers", "2", "--log", "none"]
-    return [sys.executable, "-m", "harness", *run_it, *map(str, more)]
-
-
-def command(file: Path, out: Path, *more: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(words(file, out, *more), capture_output=True, text=True, check=False, timeout=120)
-
-
-def started(file: Path, out: Path, *more: object) -> subprocess.Popen[str]:
+def started(file: Path, out: Path) -> subprocess.Popen[str]:
     """The command in a session of its own: all processes that it starts can be found by it."""
     return subprocess.Popen(
-        words(file, out, *more), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        words_of(*words(file, out)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
 
 
@@ -84,12 +73,6 @@ def ended(leader: int, within: float) -> bool:
     return not session(leader)
 
 
-def digests(out: Path) -> dict[str, str]:
-    results = harness.load_results(out)
-    assert results["key"].is_unique
-    return dict(zip(results["key"], results["digest"], strict=True))
-
-
 def runs_of(out: Path) -> dict[str, int]:
     """Which run flew each flight that is kept."""
     try:
@@ -99,7 +82,7 @@ def runs_of(out: Path) -> dict[str, int]:
         return {}  # killed before there was a journal
 
 
-def until(condition: object, process: subprocess.Popen[str], within: float = 60.0) -> None:
+def until(condition: Callable[[], object], process: subprocess.Popen[str], within: float = 60.0) -> None:
     """Waits until `condition()` holds."""
     end = time.monotonic() + within
     while not condition():
@@ -110,7 +93,7 @@ def until(condition: object, process: subprocess.Popen[str], within: float = 60.
 
 def test_a_parent_killed_at_ten_moments_loses_no_flight_and_flies_none_twice(tmp_path: Path) -> None:
     file = settings(tmp_path, count=1000, duration=40.0)
-    flown(file, tmp_path / "undisturbed", workers=0)
+    fly_matrix(file, tmp_path / "undisturbed")
     out, moments = tmp_path / "out", random.Random(4)
     kept: dict[str, int] = {}
     killed = 0
@@ -128,7 +111,7 @@ def test_a_parent_killed_at_ten_moments_loses_no_flight_and_flies_none_twice(tmp
         kept = now
     assert killed >= 5
     assert kept
-    done = command(file, out)
+    done = command(*words(file, out))
     assert done.returncode == 0, done.stderr
     assert kept.items() <= runs_of(out).items()
     assert digests(out) == digests(tmp_path / "undisturbed")
@@ -143,8 +126,8 @@ def die(task: Task, folder: Path) -> WorkerResult:
 
 def test_a_flight_that_kills_its_worker_is_one_row_and_costs_no_other(tmp_path: Path) -> None:
     file = settings(tmp_path, count=40)
-    flown(file, tmp_path / "undisturbed", workers=0)
-    progress = flown(file, tmp_path / "out", fly=die)
+    fly_matrix(file, tmp_path / "undisturbed")
+    progress = fly_matrix(file, tmp_path / "out", options=replace(WORKERS, fly=die))
     assert (progress.done, progress.failed) == (40, 2)
     results = harness.load_results(tmp_path / "out").set_index("seed")
     assert results.index[results["outcome"] == "worker_died"].tolist() == [3, 17]
@@ -153,8 +136,9 @@ def test_a_flight_that_kills_its_worker_is_one_row_and_costs_no_other(tmp_path: 
     others = results["outcome"] == "completed"
     assert others.sum() == 38
     assert (results["digest"][others] == alone["digest"][others]).all()
-    assert flown(file, tmp_path / "out").done == 0  # a failure is a row: it is flown again only when asked to
-    assert flown(file, tmp_path / "out", retry_failed=True).done == 2
+    # A failure is a row: it is flown again only when asked to.
+    assert fly_matrix(file, tmp_path / "out", options=WORKERS).done == 0
+    assert fly_matrix(file, tmp_path / "out", options=replace(WORKERS, retry_failed=True)).done == 2
     assert digests(tmp_path / "out") == digests(tmp_path / "undisturbed")
 
 
@@ -189,7 +173,9 @@ def hang(task: Task, folder: Path) -> WorkerResult:
 
 def test_a_flight_that_hangs_is_ended_and_costs_no_other(tmp_path: Path) -> None:
     begin = time.monotonic()
-    progress = flown(settings(tmp_path, count=12), tmp_path / "out", fly=hang, timeout=1.0)
+    progress = fly_matrix(
+        settings(tmp_path, count=12), tmp_path / "out", options=replace(WORKERS, fly=hang, timeout=1.0)
+    )
     assert time.monotonic() - begin < 25.0
     assert progress.failed == 2
     results = harness.load_results(tmp_path / "out")
@@ -202,7 +188,7 @@ def test_a_flight_may_take_twenty_times_its_estimate(tmp_path: Path, monkeypatch
     file = settings(tmp_path, count=3, duration=2000.0)
     matrix = read_matrix(read_settings(file))
     (limit,) = {20.0 * typical_wall_time(matrix.flight(combination)) for combination in matrix.combinations()}
-    flown(file, tmp_path / "out", fly=hang, workers=1)
+    fly_matrix(file, tmp_path / "out", options=replace(WORKERS, fly=hang, workers=1))
     results = harness.load_results(tmp_path / "out")
     assert results["outcome"].tolist() == ["completed", "completed", "timeout"]
     assert 0.2 * limit < float(results["reason"][2].split()[2]) < 10.0 * limit  # it learns from the others
@@ -229,7 +215,7 @@ def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:
     first = started(file, tmp_path / "out")
     try:
         until(lambda: runs_of(tmp_path / "out"), first)
-        second = command(file, tmp_path / "out")
+        second = command(*words(file, tmp_path / "out"))
         assert second.returncode == 2
         assert "another run writes there" in second.stderr.splitlines()[-1]
         assert str(first.pid) in second.stderr
@@ -258,7 +244,7 @@ def remount(disk: Path, options: str) -> None:
 
 def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Path, small_disk: Path) -> None:
     file = settings(tmp_path, count=900, duration=20.0)
-    done = command(file, small_disk / "out")
+    done = command(*words(file, small_disk / "out"))
     assert done.returncode == 2
     assert "disk is full" in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
@@ -267,14 +253,13 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Pa
     table, rest = small_disk / "table.csv", small_disk / "rest"
     with pytest.raises(OSError, match="No space left"):
         rest.write_bytes(bytes(2_000_000))
-    exported = [sys.executable, "-m", "harness", "export", f"{small_disk / 'out'}:{next(iter(kept))}", "--to", "csv"]
-    done = subprocess.run([*exported, "--out", str(table)], capture_output=True, text=True, check=False, timeout=120)
+    done = command("export", f"{small_disk / 'out'}:{next(iter(kept))}", "--to", "csv", "--out", table)
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1] == f"{table}: No space left on device"
     assert {path.name for path in small_disk.iterdir()} == {"out", "rest"}
     rest.unlink()
     remount(small_disk, "size=50m")
-    again = command(file, small_disk / "out")
+    again = command(*words(file, small_disk / "out"))
     assert again.returncode == 0, again.stderr
     assert kept.items() <= runs_of(small_disk / "out").items()
     assert len(digests(small_disk / "out")) == 900
@@ -282,10 +267,10 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Pa
 
 def test_a_directory_that_can_only_be_read_is_told_and_still_read(tmp_path: Path, small_disk: Path) -> None:
     file = settings(tmp_path, count=5)
-    flown(file, small_disk / "out", workers=0)
+    fly_matrix(file, small_disk / "out")
     remount(small_disk, "ro")
     for out in (small_disk / "out", small_disk / "new"):
-        done = command(file, out)
+        done = command(*words(file, out))
         assert done.returncode == 2
         assert "cannot be written" in done.stderr.splitlines()[-1]
         assert "Traceback" not in done.stderr
@@ -307,7 +292,7 @@ def damage(path: Path, how: str) -> None:
 @pytest.mark.parametrize("how", ["no database", "cut", "overwritten", "of another program"])
 def test_a_damaged_journal_is_told_and_left_as_it_is(tmp_path: Path, how: str) -> None:
     file, out = settings(tmp_path, count=30), tmp_path / "out"
-    flown(file, out, workers=0)
+    fly_matrix(file, out)
     if how == "of another program":
         (out / JOURNAL).unlink()
         with sqlite3.connect(out / JOURNAL) as other:
@@ -317,7 +302,7 @@ def test_a_damaged_journal_is_told_and_left_as_it_is(tmp_path: Path, how: str) -
         damage(out / JOURNAL, how)
     before = (out / JOURNAL).read_bytes()
     file.write_text(file.read_text().replace("count = 30", "count = 31"))
-    done = command(file, out)
+    done = command(*words(file, out))
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith(f"{out / JOURNAL}: is ")
     assert "nothing was changed" in done.stderr
@@ -327,10 +312,10 @@ def test_a_damaged_journal_is_told_and_left_as_it_is(tmp_path: Path, how: str) -
 
 def test_settings_changed_in_between_are_new_flights_and_the_old_stay(tmp_path: Path) -> None:
     file, out = settings(tmp_path, count=4), tmp_path / "out"
-    flown(file, out, workers=0)
+    fly_matrix(file, out)
     old = digests(out)
     file.write_text(file.read_text().replace("paper_1", "paper").replace("count = 4", "count = 6"))
-    progress = flown(file, out, workers=0)
+    progress = fly_matrix(file, out)
     assert (progress.done, progress.earlier) == (6, 0)
     assert len(digests(out)) == 10
     assert old.items() <= digests(out).items()
@@ -338,16 +323,16 @@ def test_settings_changed_in_between_are_new_flights_and_the_old_stay(tmp_path: 
 
 def test_the_hundredth_flight_of_a_worker_is_its_first(tmp_path: Path) -> None:
     file = settings(tmp_path, count=101, duration=1.0, plant="sixdof")
-    flown(file, tmp_path / "out", workers=1)
+    fly_matrix(file, tmp_path / "out", options=replace(WORKERS, workers=1))
     shutil.copy(file, tmp_path / "last.toml")
     last = tmp_path / "last.toml"
     last.write_text(file.read_text().replace("start = 0, count = 101", "start = 100, count = 1"))
-    flown(last, tmp_path / "last", workers=1)
+    fly_matrix(last, tmp_path / "last", options=replace(WORKERS, workers=1))
     assert digests(tmp_path / "last").items() <= digests(tmp_path / "out").items()
 
 
 def test_a_worker_has_one_numeric_thread(tmp_path: Path) -> None:
-    flown(settings(tmp_path, count=1), tmp_path / "out", fly=threads)
+    fly_matrix(settings(tmp_path, count=1), tmp_path / "out", options=replace(WORKERS, fly=threads))
     (reason,) = harness.load_results(tmp_path / "out")["reason"]
     assert reason == "it could not be flown: RuntimeError: 1 1 1"
 

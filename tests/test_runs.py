@@ -9,7 +9,7 @@ import platform
 import shutil
 import sqlite3
 import subprocess
-import sys
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -20,10 +20,10 @@ import harness
 from harness.metric import MEANING
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, mixed_versions
-from harness.runs.run import Options, Progress, run
 from harness.runs.store import JOURNAL, find, reading
 from harness.runs.story import story
 from harness.settings import read_settings
+from tests.builders import EXPERIMENTS, HERE, ROOT, command, copied_airframe, digests, fly_matrix, words_of, write
 
 MATRIX = """\
 title = "A title"
@@ -43,27 +43,7 @@ seed = { start = 0, count = 5 }
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    path = tmp_path / "matrix.toml"
-    path.write_text(MATRIX, encoding="utf-8")
-    return path
-
-
-def command(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "harness", *map(str, words)], capture_output=True, text=True, check=False, timeout=120
-    )
-
-
-def flown(file: Path, out: Path, *overrides: str, workers: int = 0, **options: object) -> Progress:
-    """In this process, or by workers."""
-    matrix = read_matrix(read_settings(file, overrides))
-    *_, progress = run(matrix, out, Options(workers=workers, log=options.pop("log", "none"), **options))
-    return progress
-
-
-def digests(out: Path) -> dict[str, str]:
-    results = harness.load_results(out)
-    return dict(zip(results["key"], results["digest"], strict=True))
+    return write(tmp_path / "matrix.toml", MATRIX)
 
 
 def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: Path) -> None:
@@ -97,8 +77,8 @@ def test_a_file_in_the_place_of_the_directory_is_told_and_left(file: Path) -> No
 
 def test_progress_moves_on_a_terminal(file: Path, tmp_path: Path) -> None:
     terminal, its_end = os.openpty()
-    words = [sys.executable, "-m", "harness", "run", file, "--out", tmp_path / "out", "--workers", 0, "--log", "none"]
-    with subprocess.Popen(list(map(str, words)), stdout=subprocess.DEVNULL, stderr=its_end) as run_:
+    words = words_of("run", file, "--out", tmp_path / "out", "--workers", 0, "--log", "none")
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=its_end) as run_:
         os.close(its_end)
         shown = ""
         with contextlib.suppress(OSError):  # the terminal's, when the last one that writes to it has ended
@@ -112,7 +92,7 @@ def test_progress_moves_on_a_terminal(file: Path, tmp_path: Path) -> None:
 
 
 def test_results_are_one_row_per_flight_with_every_setting_and_metric(file: Path, tmp_path: Path) -> None:
-    flown(file, tmp_path / "out", "law.max_heading_rate_deg_s=inf")
+    fly_matrix(file, tmp_path / "out", "law.max_heading_rate_deg_s=inf")
     results = harness.load_results(tmp_path / "out")
     assert set(MEANING) <= set(results.columns)
     assert list(results["plant"]) == ["kinematic", "sixdof"] * 5
@@ -127,7 +107,7 @@ def test_results_are_one_row_per_flight_with_every_setting_and_metric(file: Path
 
 def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    flown(file, out)
+    fly_matrix(file, out)
     row = harness.load_results(out).iloc[1]
     place = f"{out}:{row['key'][:7]}"
     again = command("fly", place, "--json")
@@ -149,14 +129,14 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
 
 def test_a_story_tells_the_air_that_the_flight_met(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    flown(file, out, "seed=0", "plant=kinematic", "wind.turbulence=light", "wind.steady_mps=[3.0, 0.0]")
+    fly_matrix(file, out, "seed=0", "plant=kinematic", "wind.turbulence=light", "wind.steady_mps=[3.0, 0.0]")
     told = list(story(out, find(out, harness.load_results(out)["key"][0])))
     assert any("in wind of 3 m/s north, 0 m/s east and light turbulence, seed 0" in line for line in told)
 
 
 @pytest.mark.parametrize("key", ["", "zz", "f" * 40])
 def test_a_key_that_names_no_row_is_one_line(file: Path, tmp_path: Path, key: str) -> None:
-    flown(file, tmp_path / "out", "seed=0", "plant=kinematic")
+    fly_matrix(file, tmp_path / "out", "seed=0", "plant=kinematic")
     done = command("show", f"{tmp_path / 'out'}:{key}")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
@@ -164,15 +144,13 @@ def test_a_key_that_names_no_row_is_one_line(file: Path, tmp_path: Path, key: st
 
 
 def test_a_row_is_flown_from_the_store_when_its_track_and_its_airframe_are_gone(tmp_path: Path) -> None:
-    track, airframe = tmp_path / "track.csv", tmp_path / "my_plane"
-    track.write_text("time_s,north_m,east_m\n" + "".join(f"{t},{2 * t},{t * t / 9}\n" for t in range(5)))
-    shipped = Path(harness.__file__).parent.parent / "aircraft" / "skywalker_x8"
-    shutil.copytree(shipped, airframe)
-    (airframe / "skywalker_x8.xml").rename(airframe / "my_plane.xml")
+    rows = "".join(f"{t},{2 * t},{t * t / 9}\n" for t in range(5))
+    track = write(tmp_path / "track.csv", "time_s,north_m,east_m\n" + rows)
+    airframe = copied_airframe("skywalker_x8", tmp_path / "my_plane")
     file, out = tmp_path / "one.toml", tmp_path / "out"
     flight = f'[flight]\nplant = "sixdof"\naircraft = "{airframe}"\nduration_s = 2.0\n[flight.law]\nname = "smc"\n'
     file.write_text(flight + '[flight.target]\ntrack = "track.csv"\n')
-    flown(file, out)
+    fly_matrix(file, out)
     track.unlink()
     shutil.rmtree(airframe)
     (key,) = harness.load_results(out)["key"]
@@ -182,10 +160,10 @@ def test_a_row_is_flown_from_the_store_when_its_track_and_its_airframe_are_gone(
 
 
 def test_the_number_of_workers_and_the_order_change_nothing(file: Path, tmp_path: Path) -> None:
-    flown(file, tmp_path / "serial")
+    fly_matrix(file, tmp_path / "serial")
     alone = digests(tmp_path / "serial")
     for workers in (1, 2, 4):
-        flown(file, tmp_path / f"{workers}", workers=workers)
+        fly_matrix(file, tmp_path / f"{workers}", options=replace(HERE, workers=workers))
         assert digests(tmp_path / f"{workers}") == alone
 
 
@@ -196,16 +174,15 @@ def append(path: Path, text: str) -> None:
 @pytest.fixture
 def own_copy(tmp_path: Path) -> Path:
     """A folder with copies of the packages, in which files may be edited: a Python started there uses them."""
-    root = Path(harness.__file__).parent.parent
     for package in ("harness", "autopilot", "aircraft"):
-        shutil.copytree(root / package, tmp_path / "copy" / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / package, tmp_path / "copy" / package, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path / "copy"
 
 
 def in_copy(copy: Path, *words: object) -> str:
     """The command, of the copy: of `run` what it flew, else its last line."""
     done = subprocess.run(
-        [sys.executable, "-m", "harness", *map(str, words)],
+        words_of(*words),
         cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -279,14 +256,15 @@ def test_the_store_knows_where_its_rows_come_from(file: Path, tmp_path: Path) ->
     assert run_["started"] <= run_["ended"]
     assert json.loads(run_["packages"])["jsbsim"] == version("jsbsim")
     assert run_["python"] == platform.python_version()
-    root = Path(harness.__file__).parent.parent
-    head = subprocess.run(["git", "-C", str(root), "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+    head = subprocess.run(["git", "-C", str(ROOT), "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
     assert run_["git_commit"] == (head.stdout.strip() or None)
     assert (run_["git_dirty"] is None) == (run_["git_commit"] is None)
 
 
 @pytest.mark.parametrize(("log", "expected"), [("all", 30), ("none", 0), ("failed", 3), ("sample", 10)])
-def test_the_flights_asked_for_are_recorded(tmp_path: Path, monkeypatch, log: str, expected: int) -> None:
+def test_the_flights_asked_for_are_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: str, expected: int
+) -> None:
     file, out = tmp_path / "m.toml", tmp_path / "out"
     file.write_text(
         '[flight]\nduration_s = 1.0\nplant = "kinematic"\n[flight.law]\nname = "smc"\n'
@@ -298,7 +276,7 @@ def test_the_flights_asked_for_are_recorded(tmp_path: Path, monkeypatch, log: st
         '[matrix]\n"metrics.monitoring_range_m, seed" = [[1.0, 0], [1.0, 1], [1.0, 2], [5000.0, 3], [5000.0, 4]]\n'
     )
     monkeypatch.setattr("harness.runs.run.RECORDED", 10)
-    flown(file, out, log=log)
+    fly_matrix(file, out, options=replace(HERE, log=log))
     results = harness.load_results(out)
     recorded = {path.stem for path in (out / "flights").iterdir()} if expected else set()
     assert recorded <= set(results["key"])
@@ -307,9 +285,9 @@ def test_the_flights_asked_for_are_recorded(tmp_path: Path, monkeypatch, log: st
         assert set(results["key"][results["outcome"] == "target_lost"]) == recorded
 
 
-def test_a_sample_has_whole_pairs(file: Path, tmp_path: Path, monkeypatch) -> None:
+def test_a_sample_has_whole_pairs(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.runs.run.RECORDED", 4)
-    flown(file, tmp_path / "out", log="sample")
+    fly_matrix(file, tmp_path / "out", options=replace(HERE, log="sample"))
     results = harness.load_results(tmp_path / "out").set_index("key")
     recorded = [path.stem for path in (tmp_path / "out" / "flights").iterdir()]
     assert sorted(results.loc[recorded, "plant"]) == ["kinematic", "kinematic", "sixdof", "sixdof"]
@@ -335,13 +313,13 @@ def test_a_dry_run_tells_the_size_and_writes_nothing(file: Path, tmp_path: Path)
     assert checked.stdout.splitlines()[-1] == f"{file}: ok"
 
 
-EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("*.toml"))
+SHIPPED = sorted(EXPERIMENTS.glob("*.toml"))
 
 
-@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=[path.stem for path in EXPERIMENTS])
+@pytest.mark.parametrize("experiment", SHIPPED, ids=[path.stem for path in SHIPPED])
 def test_a_shipped_experiment_flies(experiment: Path, tmp_path: Path) -> None:
     """The first flights of each, much shorter: by every plant that it names."""
-    progress = flown(experiment, tmp_path / "out", "duration_s=2.0", limit=4)
+    progress = fly_matrix(experiment, tmp_path / "out", "duration_s=2.0", options=replace(HERE, limit=4))
     assert (progress.failed, progress.done) == (0, min(4, progress.total))
     matrix = read_matrix(read_settings(experiment))
     assert matrix.experiment.question.endswith("?")
@@ -351,4 +329,4 @@ def test_a_shipped_experiment_flies(experiment: Path, tmp_path: Path) -> None:
 
 def test_the_experiments_of_the_issue_are_shipped() -> None:
     names = {"paper", "wind", "bank", "sampling", "gains", "aircraft", "monte_carlo"}
-    assert names <= {path.stem for path in EXPERIMENTS}
+    assert names <= {path.stem for path in SHIPPED}

@@ -2,23 +2,20 @@
 
 import socket
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner, Result
 
-from harness.cli.main import harness
 from harness.log import COLUMNS
 from harness.plants.ladder import PLANTS
 from harness.review.reading import read_logs
 from harness.runs.logs import named
-from harness.runs.matrix import read_matrix
 from harness.runs.results import load_results
-from harness.runs.run import Options, run
 from harness.runs.store import JOURNAL
-from harness.settings import read_settings
+from tests.builders import HERE, fly_matrix, invoke, write
 
 MATRIX = """\
 [flight]
@@ -39,10 +36,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     file = folder / "matrix.toml"
     for plant, log in (("kinematic", "all"), ("sixdof", "none")):
-        file.write_text(MATRIX.format(plant=plant), encoding="utf-8")
-        matrix = read_matrix(read_settings(file, ()))
-        for _ in run(matrix, folder / "out", Options(workers=0, log=log)):
-            pass
+        fly_matrix(write(file, MATRIX.format(plant=plant)), folder / "out", options=replace(HERE, log=log))
     return folder / "out"
 
 
@@ -51,12 +45,8 @@ def key_of(out: Path, plant: str, gains: str) -> str:
     return str(rows[(rows["plant"] == plant) & (rows["law.gains"] == gains)]["key"].item())
 
 
-def command(*words: object) -> Result:
-    return CliRunner().invoke(harness, [str(word) for word in words])
-
-
 def test_a_pair_is_the_same_flight_on_each_plant_with_the_kinematic_one_first(out: Path, tmp_path: Path) -> None:
-    done = command("view", out, "--pair", key_of(out, "sixdof", "paper")[:6], "--save", tmp_path / "pair.rrd")
+    done = invoke("view", out, "--pair", key_of(out, "sixdof", "paper")[:6], "--save", tmp_path / "pair.rrd")
     assert done.exit_code == 0, done.output
     logs = read_logs(tmp_path / "pair.rrd")
     assert list(logs) == list(PLANTS)
@@ -68,13 +58,13 @@ def test_a_pair_is_the_same_flight_on_each_plant_with_the_kinematic_one_first(ou
 
 def test_six_flights_are_named_by_what_they_differ_in(out: Path, tmp_path: Path) -> None:
     chosen = [word for key in load_results(out)["key"] for word in ("--flight", key)]
-    done = command("view", out, *chosen, "--save", tmp_path / "six.rrd")
+    done = invoke("view", out, *chosen, "--save", tmp_path / "six.rrd")
     assert done.exit_code == 0, done.output
     logs = read_logs(tmp_path / "six.rrd")
     gains = ("paper", "paper_1", "fitted")
     assert sorted(logs) == sorted(f"{plant} {name}" for plant in ("kinematic", "sixdof") for name in gains)
     assert sorted(log.digest for log in logs.values()) == sorted(load_results(out)["digest"])
-    again = command("view", tmp_path / "six.rrd", "--flight", "sixdof paper", "--save", tmp_path / "one.rrd")
+    again = invoke("view", tmp_path / "six.rrd", "--flight", "sixdof paper", "--save", tmp_path / "one.rrd")
     assert again.exit_code == 0, again.output
     assert read_logs(tmp_path / "one.rrd")["sixdof paper"].digest == logs["sixdof paper"].digest
     assert list(named([logs["sixdof paper"]] * 2)) == ["sixdof", "sixdof 2"]
@@ -86,7 +76,7 @@ def test_a_flight_flown_again_that_is_not_the_stored_one_is_said(out: Path, tmp_
         (digest,) = journal.execute("SELECT digest FROM flights WHERE key = ?", (key,)).fetchone()
         journal.execute("UPDATE flights SET digest = 'of another flight' WHERE key = ?", (key,))
     try:
-        done = command("view", f"{out}:{key}", "--save", tmp_path / "a.rrd")
+        done = invoke("view", f"{out}:{key}", "--save", tmp_path / "a.rrd")
     finally:
         with sqlite3.connect(out / JOURNAL) as journal:
             journal.execute("UPDATE flights SET digest = ? WHERE key = ?", (digest, key))
@@ -98,14 +88,14 @@ def test_a_flight_flown_again_that_is_not_the_stored_one_is_said(out: Path, tmp_
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
 def test_an_exported_log_is_the_flight_to_the_last_bit(plant: str, out: Path, tmp_path: Path) -> None:
     key = key_of(out, plant, "paper_1")
-    assert command("view", f"{out}:{key}", "--save", tmp_path / "a.rrd").exit_code == 0
+    assert invoke("view", f"{out}:{key}", "--save", tmp_path / "a.rrd").exit_code == 0
     (log,) = read_logs(tmp_path / "a.rrd").values()
     for what in (f"{out}:{key[:8]}", tmp_path / "a.rrd"):
         for kind, read in (
             ("csv", lambda path: pd.read_csv(path, dtype=str).astype(float)),
             ("parquet", pd.read_parquet),
         ):
-            done = command("export", what, "--to", kind, "--out", tmp_path / f"a.{kind}")
+            done = invoke("export", what, "--to", kind, "--out", tmp_path / f"a.{kind}")
             assert done.exit_code == 0, done.output
             table = read(tmp_path / f"a.{kind}")
             assert tuple(table.columns) == COLUMNS
@@ -129,7 +119,7 @@ def test_an_exported_log_is_the_flight_to_the_last_bit(plant: str, out: Path, tm
     ],
 )
 def test_bad_input_is_one_line(words: list[str], said: str, out: Path) -> None:
-    done = command(*(word.format(out=out) for word in words))
+    done = invoke(*(word.format(out=out) for word in words))
     assert done.exit_code == 2
     assert said in done.stderr
     assert len(done.stderr.splitlines()) == 1
@@ -140,7 +130,7 @@ def test_without_a_display_the_way_out_is_named(tmp_path: Path, monkeypatch: pyt
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     (tmp_path / "a.rrd").touch()
-    done = command("view", tmp_path / "a.rrd")
+    done = invoke("view", tmp_path / "a.rrd")
     assert done.exit_code == 2
     assert done.stderr == "there is no display here: write a file with --save, and open it where there is one\n"
 
@@ -149,6 +139,6 @@ def test_an_empty_viewer_on_a_port_that_is_taken_is_refused(monkeypatch: pytest.
     monkeypatch.setenv("DISPLAY", ":0")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        done = command("view", "--port", port)
+        done = invoke("view", "--port", port)
     assert done.exit_code == 2
     assert f"port {port} is taken" in done.stderr
