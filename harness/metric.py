@@ -1,6 +1,12 @@
-"""The numbers a flight is judged by, each from the log alone. None where the plant has no such thing."""
+"""The metrics that a flight is judged by: each is declared once, in `METRICS`, and measured from the log alone.
 
-from collections.abc import Mapping
+All that names, prints, compares or stores a metric reads its declaration: `harness list metrics`, the tables of `fly`,
+`run` and `show`, the columns of results, the comparison and its report. To add a metric, write one entry.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -8,31 +14,12 @@ from numpy.typing import NDArray
 
 from harness.log import FlightLog
 from harness.plants.turn import rate_of_turn
+from harness.series import overshoot, peak, rms, settling_time
 
 Array = NDArray[np.float64]
+Value = float | bool | None  # None: the plant has no such thing, or the flight does not show it
 
-MEANING: Mapping[str, str] = MappingProxyType(
-    {
-        "convergence_time_s": "first time after which |range error| stays below the tolerance, 5 s of it at least",
-        "range_error_final_m": "at the end",
-        "range_error_rms_m": "over the last half",
-        "range_error_peak_m": "largest, over the last half",
-        "overshoot_m": "largest range error of the opposite sign after the first crossing",
-        "saturation_fraction": "share of the last half with the command at its limit",
-        "command_activity_deg_s2": "total variation of the command per second, last half",
-        "heading_rate_error_rms_deg_s": "flown minus commanded, both averaged over 0.25 s (-3 dB at 1.8 Hz)",
-        "heading_rate_lag_s": "delay at which the flown rate matches the commanded one best",
-        "heading_rate_gain": "flown over commanded, at that delay",
-        "turn_ratio": "flown over g tan(bank) / V",
-        "sideslip_rms_deg": "over the flight",
-        "sideslip_peak_deg": "largest",
-        "bank_peak_deg": "largest",
-        "lateral_acceleration_rms_mps2": "specific force along the wing; none in a coordinated turn",
-        "airspeed_deviation_rms_mps": "from the nominal airspeed",
-        "altitude_deviation_peak_m": "largest, from the commanded altitude",
-    }
-)
-
+YES_OR_NO = "yes/no"  # the unit of a metric that is true or false
 SETTLED_FOR = 5.0  # s
 AVERAGED_OVER = 0.25  # s
 LONGEST_LAG = 2.0  # s
@@ -40,52 +27,95 @@ LEAST_EXCITATION = np.radians(0.5)  # rad/s: a command, or a turn, that varies l
 LEAST_EXPLAINED = 0.5  # share of the flown rate's variation: a command that explains less tells nothing of the lag
 
 
-def metrics(log: FlightLog) -> dict[str, float | None]:
-    """All metrics of a flight, by the names of `MEANING`. Units by suffix. None of them when it has no row."""
+@dataclass(frozen=True)
+class Signals:
+    """A flight's log, and what several metrics make of it, worked out once. SI, rad. The log has at least one row."""
+
+    log: FlightLog
+
+    @cached_property
+    def period(self) -> float:
+        """Guidance period, s: the time from one row to the next."""
+        return self.log.flight.guidance_period
+
+    @cached_property
+    def held_command(self) -> Array:
+        """Heading-rate command of each period but the last, rad/s."""
+        return self.log["heading_rate_command"][:-1]
+
+    @cached_property
+    def flown_rate(self) -> Array:
+        """Mean heading rate while each of these commands was held, rad/s."""
+        return np.diff(np.unwrap(self.log["heading"])) / self.period
+
+    @cached_property
+    def lag_and_gain(self) -> tuple[float | None, float | None]:
+        """Delay, s, of the flown heading rate behind the command, and their ratio at that delay."""
+        return _lag_and_gain(self.held_command, self.flown_rate, self.period)
+
+    def settling_time(self, tolerances: float = 1.0) -> float | None:
+        """When |range error| is below so many times the flight's tolerance for good, s; see `SETTLED_FOR`."""
+        tolerance = tolerances * self.log.flight.metrics.tolerance
+        return settling_time(self.log["time"], self.log["range_error"], tolerance, SETTLED_FOR)
+
+    def circling(self, column: str) -> Array:
+        """The rows of a column over which circling is judged."""
+        return self.log[column][len(self.log) // 2 :]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metric:
+    """One number, or truth value, that every flight is judged by."""
+
+    name: str  # its key in every table and file, which ends with the unit
+    unit: str  # "s", "deg/s2"; "1" of a ratio; `YES_OR_NO`
+    meaning: str  # one line
+    measure: Callable[[Signals], Value]
+    heading: str  # what tables and figures call it
+    statistic: str = ""  # printed after the unit: "rms", "peak"
+    percent: bool = False  # a share, in percent where the heading says so
+    in_short_tables: bool = False  # those that `run` and `demo` print
+    of_circling: bool = False  # it means something only where the law circles its target
+    ideal: float | None = 0.0  # the best there can be; None: none is better, and a comparison leaves it out
+    worst: float | None = None  # the worst there can be; None: there is no bound
+
+    @property
+    def label(self) -> str:
+        """The unit as it stands beside a heading: "m rms", "share"."""
+        return " ".join(word for word in ("" if self.unit == "1" else self.unit, self.statistic) if word) or "1"
+
+    @property
+    def column_heading(self) -> str:
+        """Heading and unit over a narrow column, a line for each word of the heading."""
+        return "\n".join([*self.heading.split(), "%" if self.percent else self.label])
+
+    @property
+    def scale(self) -> float:
+        """How many of the column's unit make the metric's own."""
+        return 100.0 if self.percent else 1.0
+
+
+def measure(log: FlightLog) -> dict[str, float | bool | None]:
+    """All metrics of a flight by their names, in their units. Each of them None when the log has no row."""
     if not len(log):
-        return dict.fromkeys(MEANING)
-    period = log.flight.guidance_period
-    time, error, command = log["time"], log["range_error"], log["heading_rate_command"]
-    half = len(log) // 2
-    lasted = max(time[-1] - time[half], period)
-    flown = np.diff(np.unwrap(log["heading"])) / period  # mean rate while each command was held
-    held = command[:-1]
-    lag, gain = _lag_and_gain(held, flown, period)
-    unlimited = log["unlimited_command"][half:]
-    return {
-        "convergence_time_s": settling_time(time, error, log.flight.metrics.tolerance),
-        "range_error_final_m": float(error[-1]),
-        "range_error_rms_m": _rms(error[half:]),
-        "range_error_peak_m": _peak(error[half:]),
-        "overshoot_m": _overshoot(error),
-        "saturation_fraction": float(np.mean(np.abs(command[half:]) < np.abs(unlimited))),
-        "command_activity_deg_s2": float(np.degrees(np.abs(np.diff(command[half:])).sum() / lasted)),
-        "heading_rate_error_rms_deg_s": _degrees(_rms(_averaged(flown - held, AVERAGED_OVER / period))),
-        "heading_rate_lag_s": lag,
-        "heading_rate_gain": gain,
-        "turn_ratio": _turn_ratio(log),
-        "sideslip_rms_deg": _degrees(_rms(log["sideslip"])),
-        "sideslip_peak_deg": _degrees(_peak(log["sideslip"])),
-        "bank_peak_deg": _degrees(_peak(log["bank"])),
-        "lateral_acceleration_rms_mps2": _rms(log["lateral_acceleration"]),
-        "airspeed_deviation_rms_mps": _rms(log["airspeed"] - log.flight.start.airspeed),
-        "altitude_deviation_peak_m": _peak(log["altitude"] - log.flight.start.altitude),
-    }
+        return dict.fromkeys(METRICS)
+    signals = Signals(log)
+    return {name: metric.measure(signals) for name, metric in METRICS.items()}
 
 
-def settling_time(time: Array, error: Array, tolerance: float) -> float | None:
-    """When |error| is below the tolerance for good, with 5 s at least left; None when that is never."""
-    outside = np.flatnonzero(~(np.abs(error) < tolerance))
-    first = outside[-1] + 1 if outside.size else 0
-    if first >= len(time) or time[-1] - time[first] < SETTLED_FOR:
-        return None
-    return float(time[first])
+def _saturation(signals: Signals) -> float:
+    command, unlimited = (signals.circling(column) for column in ("heading_rate_command", "unlimited_command"))
+    return float(np.mean(np.abs(command) < np.abs(unlimited)))
 
 
-def _overshoot(error: Array) -> float | None:
-    """None when the error never changes sign: there was nothing to overshoot."""
-    crossed = np.flatnonzero(error * error[0] < 0)
-    return float(np.abs(error[crossed]).max()) if crossed.size else None
+def _activity(signals: Signals) -> float:
+    time, command = signals.circling("time"), signals.circling("heading_rate_command")
+    return float(np.degrees(np.abs(np.diff(command)).sum() / max(time[-1] - time[0], signals.period)))
+
+
+def _heading_rate_error(signals: Signals) -> float | None:
+    apart = signals.flown_rate - signals.held_command
+    return _degrees(rms(_averaged(apart, AVERAGED_OVER / signals.period)))
 
 
 def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | None, float | None]:
@@ -141,12 +171,13 @@ def _sums(x: Array, begin: NDArray[np.intp], size: int) -> Array:
     return running[begin + size] - running[begin]
 
 
-def _turn_ratio(log: FlightLog) -> float | None:
+def _turn_ratio(signals: Signals) -> float | None:
+    log = signals.log
     bank = log["bank"]
     if np.isnan(bank).all():  # the plant has none
         return None
     coordinated = rate_of_turn(log["airspeed"], bank)
-    if (_rms(coordinated) or 0.0) < LEAST_EXCITATION:
+    if (rms(coordinated) or 0.0) < LEAST_EXCITATION:
         return None
     return float(coordinated @ log["heading_rate"] / (coordinated @ coordinated))
 
@@ -157,13 +188,159 @@ def _averaged(x: Array, samples: float) -> Array:
     return np.convolve(x, window / window.size, mode="valid") if len(x) >= window.size else x
 
 
-def _rms(x: Array) -> float | None:
-    return float(np.sqrt(np.mean(x * x))) if len(x) and np.isfinite(x).all() else None
-
-
-def _peak(x: Array) -> float | None:
-    return float(np.abs(x).max()) if len(x) and np.isfinite(x).all() else None
-
-
 def _degrees(x: float | None) -> float | None:
     return None if x is None else float(np.degrees(x))
+
+
+_METRICS = (
+    Metric(
+        name="convergence_time_s",
+        unit="s",
+        meaning="first time after which |range error| stays below the tolerance, 5 s of it at least",
+        measure=lambda signals: signals.settling_time(),
+        heading="convergence time",
+        in_short_tables=True,
+        of_circling=True,
+    ),
+    Metric(
+        name="range_error_final_m",
+        unit="m",
+        meaning="range error at the end",
+        measure=lambda signals: float(signals.log["range_error"][-1]),
+        heading="settled error",
+        statistic="final",
+        of_circling=True,
+    ),
+    Metric(
+        name="range_error_rms_m",
+        unit="m",
+        meaning="range error over the last half",
+        measure=lambda signals: rms(signals.circling("range_error")),
+        heading="settled error",
+        statistic="rms",
+        in_short_tables=True,
+        of_circling=True,
+    ),
+    Metric(
+        name="range_error_peak_m",
+        unit="m",
+        meaning="largest |range error| over the last half",
+        measure=lambda signals: peak(signals.circling("range_error")),
+        heading="settled error",
+        statistic="peak",
+        in_short_tables=True,
+        of_circling=True,
+    ),
+    Metric(
+        name="overshoot_m",
+        unit="m",
+        meaning="largest range error of the opposite sign after the first crossing",
+        measure=lambda signals: overshoot(signals.log["range_error"]),
+        heading="overshoot",
+        in_short_tables=True,
+        of_circling=True,
+    ),
+    Metric(
+        name="saturation_fraction",
+        unit="1",
+        meaning="share of the last half with the command at its limit",
+        measure=_saturation,
+        heading="saturation",
+        statistic="share",
+        percent=True,
+        in_short_tables=True,
+        of_circling=True,
+        worst=1.0,
+    ),
+    Metric(
+        name="command_activity_deg_s2",
+        unit="deg/s2",
+        meaning="total variation of the command per second, over the last half",
+        measure=_activity,
+        heading="command activity",
+        in_short_tables=True,
+        of_circling=True,
+    ),
+    Metric(
+        name="heading_rate_error_rms_deg_s",
+        unit="deg/s",
+        meaning="flown minus commanded heading rate, both averaged over 0.25 s (-3 dB at 1.8 Hz)",
+        measure=_heading_rate_error,
+        heading="heading-rate error",
+        statistic="rms",
+    ),
+    Metric(
+        name="heading_rate_lag_s",
+        unit="s",
+        meaning="delay at which the flown heading rate matches the commanded one best",
+        measure=lambda signals: signals.lag_and_gain[0],
+        heading="heading-rate lag",
+    ),
+    Metric(
+        name="heading_rate_gain",
+        unit="1",
+        meaning="flown over commanded heading rate, at that delay",
+        measure=lambda signals: signals.lag_and_gain[1],
+        heading="heading-rate gain",
+        ideal=1.0,
+    ),
+    Metric(
+        name="turn_ratio",
+        unit="1",
+        meaning="flown heading rate over g tan(bank) / V",
+        measure=_turn_ratio,
+        heading="turn ratio",
+        ideal=1.0,
+    ),
+    Metric(
+        name="bank_peak_deg",
+        unit="deg",
+        meaning="largest |bank|",
+        measure=lambda signals: _degrees(peak(signals.log["bank"])),
+        heading="bank",
+        statistic="peak",
+        in_short_tables=True,
+    ),
+    Metric(
+        name="sideslip_rms_deg",
+        unit="deg",
+        meaning="sideslip over the flight",
+        measure=lambda signals: _degrees(rms(signals.log["sideslip"])),
+        heading="sideslip",
+        statistic="rms",
+    ),
+    Metric(
+        name="sideslip_peak_deg",
+        unit="deg",
+        meaning="largest |sideslip|",
+        measure=lambda signals: _degrees(peak(signals.log["sideslip"])),
+        heading="sideslip",
+        statistic="peak",
+        in_short_tables=True,
+    ),
+    Metric(
+        name="lateral_acceleration_rms_mps2",
+        unit="m/s2",
+        meaning="specific force along the wing; none in a coordinated turn",
+        measure=lambda signals: rms(signals.log["lateral_acceleration"]),
+        heading="lateral acceleration",
+        statistic="rms",
+    ),
+    Metric(
+        name="airspeed_deviation_rms_mps",
+        unit="m/s",
+        meaning="airspeed minus the nominal airspeed",
+        measure=lambda signals: rms(signals.log["airspeed"] - signals.log.flight.start.airspeed),
+        heading="airspeed deviation",
+        statistic="rms",
+    ),
+    Metric(
+        name="altitude_deviation_peak_m",
+        unit="m",
+        meaning="largest |altitude minus the commanded altitude|",
+        measure=lambda signals: peak(signals.log["altitude"] - signals.log.flight.start.altitude),
+        heading="altitude deviation",
+        statistic="peak",
+    ),
+)
+METRICS: Mapping[str, Metric] = MappingProxyType({metric.name: metric for metric in _METRICS})

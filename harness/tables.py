@@ -1,21 +1,8 @@
 """Tables for a terminal and for Markdown, and how a number is written in their cells."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
-from types import MappingProxyType
 
-METRICS: Mapping[str, tuple[str, str, float]] = MappingProxyType(
-    {  # heading, unit, how many of them make the metric's own unit
-        "convergence_time_s": ("settles", "s", 1.0),
-        "range_error_rms_m": ("error", "m rms", 1.0),
-        "range_error_peak_m": ("error", "m peak", 1.0),
-        "overshoot_m": ("overshoot", "m", 1.0),
-        "saturation_fraction": ("saturated", "%", 100.0),
-        "command_activity_deg_s2": ("activity", "deg/s2", 1.0),
-        "bank_peak_deg": ("bank", "deg peak", 1.0),
-        "sideslip_peak_deg": ("sideslip", "deg peak", 1.0),
-    }
-)
 _BETWEEN = "  "  # two columns
 
 

@@ -20,7 +20,7 @@ from autopilot.laws import law
 from harness.cli.main import harness as command_line
 from harness.flight import Flight
 from harness.log import COLUMNS, FlightLog
-from harness.metric import MEANING
+from harness.metric import METRICS
 from harness.plants.plant import Outcome
 from harness.runs.matrix import read_matrix
 from harness.runs.run import Options, Progress, run
@@ -103,7 +103,7 @@ SETTINGS: Mapping[str, object] = {
     "wind.steady_mps": (0.0, 0.0), "wind.turbulence": "none", "estimator.kind": "truth",
 }  # fmt: skip
 QUIET: Mapping[str, float] = {
-    **dict.fromkeys(MEANING, 0.0), "convergence_time_s": 40.0, "heading_rate_gain": 1.0, "turn_ratio": 1.0,
+    **dict.fromkeys(METRICS, 0.0), "convergence_time_s": 40.0, "heading_rate_gain": 1.0, "turn_ratio": 1.0,
     "heading_rate_lag_s": 0.001,
 }  # fmt: skip
 

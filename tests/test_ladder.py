@@ -18,7 +18,7 @@ from harness.feasibility import warnings
 from harness.flight import Flight, plant_of
 from harness.key import flight_key
 from harness.loop import simulate
-from harness.metric import metrics
+from harness.metric import measure
 from harness.plants.coordinated import AirspeedHold, Coordinated
 from harness.plants.identified import identified
 from harness.plants.kinematic import Kinematic
@@ -155,7 +155,7 @@ def test_a_flight_flown_twice_has_the_same_bits(plant: str) -> None:
 
 
 def test_each_rung_has_the_metrics_of_what_it_has() -> None:
-    lagged, coordinated = (metrics(simulate(replace(FLIGHT, plant=plant))) for plant in ("lagged", "coordinated"))
+    lagged, coordinated = (measure(simulate(replace(FLIGHT, plant=plant))) for plant in ("lagged", "coordinated"))
     assert lagged["heading_rate_gain"] == pytest.approx(1.0, abs=0.05)
     assert lagged["heading_rate_lag_s"] == pytest.approx(0.2, abs=0.1)
     assert lagged["turn_ratio"] is lagged["bank_peak_deg"] is lagged["sideslip_peak_deg"] is None

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 import harness
-from harness.metric import MEANING
+from harness.metric import METRICS
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, mixed_versions
 from harness.runs.store import JOURNAL, find, reading
@@ -94,7 +94,7 @@ def test_progress_moves_on_a_terminal(file: Path, tmp_path: Path) -> None:
 def test_results_are_one_row_per_flight_with_every_setting_and_metric(file: Path, tmp_path: Path) -> None:
     fly_matrix(file, tmp_path / "out", "law.max_heading_rate_deg_s=inf")
     results = harness.load_results(tmp_path / "out")
-    assert set(MEANING) <= set(results.columns)
+    assert set(METRICS) <= set(results.columns)
     assert list(results["plant"]) == ["kinematic", "sixdof"] * 5
     assert list(results["seed"]) == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
     assert results["wind.steady_mps"].iloc[0] == (0.0, 0.0)

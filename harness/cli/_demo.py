@@ -10,9 +10,9 @@ from harness.feasibility import feasibility_margin, needed_rate
 from harness.flight import Flight
 from harness.log import FlightLog
 from harness.loop import simulate
-from harness.metric import metrics
+from harness.metric import METRICS, measure
 from harness.settings import flight_from_document
-from harness.tables import METRICS, number
+from harness.tables import number, table
 
 LAWS = MappingProxyType({"NFTSM_1": {"name": "nftsm", "gains": "paper_1"}, "SMC": {"name": "smc", "gains": "paper"}})
 KINEMATIC = "kinematic"
@@ -43,7 +43,7 @@ class Flown(NamedTuple):
     law: str
     plant: str  # kinematic, or the airframe
     log: FlightLog
-    metrics: Mapping[str, float | None]
+    metrics: Mapping[str, float | bool | None]
 
 
 def flight(case: Case, law: str, plant: str) -> Flight:
@@ -66,7 +66,7 @@ def fly_all() -> Iterator[Flown]:
         for law in LAWS:
             for plant in (KINEMATIC, *AIRFRAMES):
                 log = simulate(flight(case, law, plant))
-                yield Flown(case, law, plant, log, metrics(log))
+                yield Flown(case, law, plant, log, measure(log))
 
 
 def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
@@ -81,14 +81,14 @@ def record_pairs(flown: list[Flown], folder: Path) -> Iterator[Path]:
             yield path
 
 
-def table(flown: list[Flown]) -> list[str]:
+SHOWN = [metric for metric in METRICS.values() if metric.in_short_tables]
+
+
+def lines(flown: list[Flown]) -> Iterator[str]:
     """One case side by side, a line per flight: settling to 1 m; error, saturation and activity over the last half."""
-    label = 8 + max(len(f.plant) for f in flown)
-    lines = ["".join([" " * label, *(f"{METRICS[m][row]:>10}" for m in METRICS)]) for row in (0, 1)]
-    for one in flown:
-        cells = (number(one.metrics[m], METRICS[m][2]) for m in METRICS)
-        lines.append("".join([f"{one.law:8}{one.plant:{label - 8}}", *(f"{cell:>10}" for cell in cells)]))
-    return lines
+    headings = ["law", "aircraft", *(metric.column_heading for metric in SHOWN)]
+    rows = ([one.law, one.plant, *(number(one.metrics[m.name], m.scale) for m in SHOWN)] for one in flown)
+    return table(headings, rows, "llr")
 
 
 def differences(flown: list[Flown]) -> list[str]:

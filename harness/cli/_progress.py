@@ -114,31 +114,26 @@ def _line(state: Progress) -> str:
 
 def tell_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     """A table by the axes: medians over what is drawn, outcomes; then the failures, and where the results are."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
+    from harness.metric import METRICS
     from harness.plants.plant import Outcome
     from harness.runs.summary import summary
-    from harness.tables import METRICS, number
+    from harness.tables import number, table
 
     results = summary(matrix, out, _MOST_LINES)
+    shown = [metric for metric in METRICS.values() if metric.in_short_tables]
+    axes = [", ".join(key.rpartition(".")[2] for key in keys.split(", ")) for keys in results.axes]
     ended = any(set(line.outcomes) != {"completed"} for line in results.lines)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 2, 0, 0))
-    for keys in results.axes:
-        table.add_column(", ".join(key.rpartition(".")[2] for key in keys.split(", ")), no_wrap=True)
-    table.add_column("settled", justify="right", no_wrap=True)
-    for heading, unit, _ in METRICS.values():
-        table.add_column(f"{heading}\n{unit}", justify="right", no_wrap=True)
-    if ended:
-        table.add_column("ended", no_wrap=True)
+    headings = [*axes, "settled", *(metric.column_heading for metric in shown), *(["ended"] if ended else [])]
+    rows = []
     for line in results.lines:
         cells = [*line.labels, f"{line.settled} of {line.flights}"]
-        cells += [number(line.medians[name], scale) for name, (_, _, scale) in METRICS.items()]
+        cells += [number(line.medians[metric.name], metric.scale) for metric in shown]
         if ended:
             cells.append(", ".join(f"{count} {outcome}" for outcome, count in line.outcomes.items()))
-        table.add_row(*cells)
-    Console(width=500).print(table)  # never cut: a narrow terminal wraps the lines
+        rows.append(cells)
+    alignment = "l" * len(axes) + "r" * (1 + len(shown)) + "l"
+    for text in table(headings, rows, alignment):
+        click.echo(text)
     if results.more:
         click.echo(f"... and {results.more} lines more; all: harness.load_results({str(out)!r}) in Python")
     for reason, count in sorted(progress.reasons.items(), key=lambda item: -item[1])[:_MOST_REASONS]:

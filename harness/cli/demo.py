@@ -39,7 +39,7 @@ def demo(out: Path) -> None:
     for case in job.CASES:
         those = [one for one in flown if one.case is case]
         click.secho(case.title, bold=True)
-        for line in job.table(those):
+        for line in job.lines(those):
             click.echo(f"  {line}")
         for sentence in job.differences(those):
             click.echo(textwrap.fill(sentence, 110, initial_indent="- ", subsequent_indent="  "))

@@ -48,7 +48,7 @@ def fly(
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
     from harness.loop import simulate
-    from harness.metric import MEANING
+    from harness.metric import METRICS
     from harness.runs.recall import row_address
     from harness.runs.row import result_of, row
     from harness.tables import number
@@ -84,7 +84,9 @@ def fly(
     if as_json:
         click.echo(json.dumps(flight_row, allow_nan=False))
     else:
-        _tell(flight_row, {name: (number(value), MEANING[name]) for name, value in flight_row["metrics"].items()})
+        _tell(
+            flight_row, {name: (number(value), METRICS[name].meaning) for name, value in flight_row["metrics"].items()}
+        )
     raise SystemExit(1 if log.outcome.failed else 0)
 
 

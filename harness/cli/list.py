@@ -47,10 +47,10 @@ def _plants() -> Iterator[str]:
 
 
 def _metrics() -> Iterator[str]:
-    from harness.metric import MEANING
+    from harness.metric import METRICS
+    from harness.tables import table
 
-    for name, meaning in MEANING.items():
-        yield f"{name:30} {meaning}"
+    yield from table(["metric", "unit", "meaning"], ([m.name, m.unit, m.meaning] for m in METRICS.values()))
 
 
 def _margins() -> Iterator[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.log import FlightLog
-from harness.metric import settling_time
+from harness.metric import Signals
 from harness.plants.plant import Outcome
 from harness.review.styled import Colour
 
@@ -111,7 +111,7 @@ def command_lane(log: FlightLog) -> list[Change]:
 
 def _circle(log: FlightLog) -> list[Change]:
     tolerance = log.flight.metrics.tolerance
-    settled = settling_time(log["time"], log["range_error"], tolerance)
+    settled = Signals(log).settling_time()
     inside = [bool((np.abs(part) < tolerance).all()) for part in _windows(log, log["range_error"])]
     changes = _lane(log, ["within tolerance" if one else "outside tolerance" for one in inside])
     if settled is None:

@@ -8,7 +8,7 @@ from functools import cache
 from harness.feasibility import feasibility_line, warnings
 from harness.key import PHYSICS_VERSION, flight_key
 from harness.log import FlightLog
-from harness.metric import MEANING, metrics
+from harness.metric import METRICS, measure
 from harness.provenance import packages
 from harness.review.styled import StyledFlight
 from harness.settings import document
@@ -28,12 +28,12 @@ def result_notes(flights: Sequence[StyledFlight], title: str, above: str, comman
             said.setdefault(line, []).append(one.name)
     of = {line: "" if len(names) == len(flights) else f" ({', '.join(names)})" for line, names in said.items()}
     parts.append("\n".join(f"- {line}{of[line]}" for line in said))
-    judged = [metrics(one.log) for one in flights]
+    judged = [measure(one.log) for one in flights]
     wide = len(flights) < 3  # enough room for the meaning
     ends = [f"{f.log.outcome.value}{': ' if f.log.reason else ''}{f.log.reason}" for f in flights]
     head = ["metric", *(one.name for one in flights), *(["meaning"] if wide else [])]
     rows = [["outcome", *ends, *(["how it ended"] if wide else [])]]
-    rows += [[name, *(number(m[name]) for m in judged), *([MEANING[name]] if wide else [])] for name in MEANING]
+    rows += [[name, *(number(m[name]) for m in judged), *([METRICS[name].meaning] if wide else [])] for name in METRICS]
     parts.append(_table([head, *rows]))
     parts += [f"Made by\n\n```\n{command}\n```"] if command else []
     return "\n\n".join(parts)

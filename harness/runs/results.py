@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.files import replacing
-from harness.metric import MEANING
+from harness.metric import METRICS, YES_OR_NO
 from harness.runs.store import reading
-from harness.settings.columns import by_column
+from harness.settings.columns import by_column, is_setting
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 PARQUET = "flights.parquet"
 _AT_ONCE = 1000  # rows
-_FIRST = ("key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds")
+_TEXTS = ("key", "outcome", "reason", "digest")
+_NUMBERS = ("feasibility_margin_deg_s", "seconds")
 _STAND = b"journal_changes"  # in the Parquet file's metadata: how far the journal was
 
 
@@ -26,7 +27,9 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
 
     Columns: key, outcome, reason, digest, feasibility_margin_deg_s, seconds (wall time of the flight), run and version
     (what decided it beside its settings: see `mixed_versions`); every setting by its dotted key below [flight] in file
-    units (lists are tuples, a list of tables is JSON text); every metric by its name, NaN for none.
+    units (lists are tuples, a list of tables is JSON text); every metric by its name, NaN for none (of one that is true
+    or false: nullable `boolean`). In the Parquet file the metadata of a column says what it is: `kind` is setting,
+    metric or result, and a metric has its `unit` and `meaning`.
     Raises `harness.runs.store.StoreError`.
     """
     folder = Path(folder)
@@ -34,7 +37,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         table = _exported(folder / PARQUET, _stand(journal))
         if table is None:
             table = _table(journal)
-    return _frame(table)
+    return _frame(_declared(table))
 
 
 def export(folder: Path) -> None:
@@ -46,7 +49,7 @@ def export(folder: Path) -> None:
         stand = _stand(journal)
         if _is_current(path, stand):
             return
-        table = _table(journal).replace_schema_metadata({_STAND: stand})
+        table = _declared(_table(journal)).replace_schema_metadata({_STAND: stand})
     with replacing(path) as partial:
         pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
 
@@ -83,14 +86,29 @@ def _table(journal: sqlite3.Connection) -> "pa.Table":
 
     parts = [pa.table(columns) for columns in _columns(journal)]
     if not parts:
-        texts = dict.fromkeys((*_FIRST[:4], "version"), pa.string())
-        numbers = dict.fromkeys((*_FIRST[4:], "run", *MEANING), pa.float64())
-        return pa.table({name: pa.array([], kind) for name, kind in {**texts, **numbers}.items()})
-    table = pa.concat_tables(parts, promote_options="permissive")
-    for name in (*MEANING, *_FIRST[4:]):
+        kinds = dict.fromkeys((*_TEXTS, "version"), pa.string()) | dict.fromkeys((*_NUMBERS, "run"), pa.float64())
+        return pa.table({name: pa.array([], kind) for name, kind in kinds.items()})
+    return pa.concat_tables(parts, promote_options="permissive")
+
+
+def _declared(table: "pa.Table") -> "pa.Table":
+    """The same with every metric there is today, each column of the type it is declared with, and what it is."""
+    import pyarrow as pa
+
+    kinds = {name: pa.bool_() if metric.unit == YES_OR_NO else pa.float64() for name, metric in METRICS.items()}
+    for name, kind in (kinds | dict.fromkeys(_NUMBERS, pa.float64())).items():
         if name in table.column_names:
-            table = table.set_column(table.column_names.index(name), name, table[name].cast(pa.float64()))
-    return table
+            table = table.set_column(table.column_names.index(name), name, table[name].cast(kind))
+        else:  # flown before there was this metric
+            table = table.append_column(name, pa.nulls(len(table), kind))
+    return table.cast(pa.schema([field.with_metadata(_about(field.name)) for field in table.schema]))
+
+
+def _about(column: str) -> dict[str, str]:
+    """What a column of results is, by the declarations: a new result is no setting, whatever its name."""
+    if column in METRICS:
+        return {"kind": "metric", "unit": METRICS[column].unit, "meaning": METRICS[column].meaning}
+    return {"kind": "setting" if is_setting(column) else "result"}
 
 
 def _columns(journal: sqlite3.Connection) -> Iterator[dict[str, list[Any]]]:
@@ -107,7 +125,7 @@ def _columns(journal: sqlite3.Connection) -> Iterator[dict[str, list[Any]]]:
 
 def _flat(row: tuple[Any, ...]) -> dict[str, Any]:
     *values, run, version, settings, metrics = row
-    columns = dict(zip(_FIRST, values, strict=True))
+    columns = dict(zip((*_TEXTS, *_NUMBERS), values, strict=True))
     columns.update(run=run, version=version[:8])
     columns.update(by_column(json.loads(settings)))
     columns.update(json.loads(metrics))
@@ -123,6 +141,8 @@ def _frame(table: "pa.Table") -> "pd.DataFrame":
         if pa.types.is_list(field.type):
             tuples = [None if value is None else tuple(value.tolist()) for value in frame[field.name]]
             frame[field.name] = pd.Series(tuples, index=frame.index, dtype=object)
+        elif field.name in METRICS and pa.types.is_boolean(field.type):
+            frame[field.name] = frame[field.name].astype("boolean")
     return frame
 
 

@@ -10,7 +10,7 @@ from harness.flight import Flight
 from harness.key import Identity, identity
 from harness.log import COLUMNS, FlightLog
 from harness.loop import simulate
-from harness.metric import MEANING, metrics
+from harness.metric import METRICS, measure
 from harness.plants.plant import Outcome, PlantError
 
 FlightRow = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s
@@ -22,7 +22,7 @@ class FlightResult(NamedTuple):
     outcome: str
     reason: str
     digest: str
-    metrics: dict[str, float | None]
+    metrics: dict[str, float | bool | None]
     final: dict[str, float]  # see `final`
     seconds: float | None  # wall time of the simulation
 
@@ -48,12 +48,12 @@ def row(flight: Flight, of: Identity, result: FlightResult) -> FlightRow:
 
 def result_of(log: FlightLog, seconds: float | None = None) -> FlightResult:
     """How the flight went."""
-    return FlightResult(log.outcome.value, log.reason, log.digest, metrics(log), final(log), seconds)
+    return FlightResult(log.outcome.value, log.reason, log.digest, measure(log), final(log), seconds)
 
 
 def failed_result(outcome: Outcome, reason: str) -> FlightResult:
     """A flight that left no log."""
-    return FlightResult(outcome.value, reason, "", dict.fromkeys(MEANING), {}, None)
+    return FlightResult(outcome.value, reason, "", dict.fromkeys(METRICS), {}, None)
 
 
 def simulate_safely(flight: Flight) -> FlightLog:

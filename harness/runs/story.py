@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from harness.metric import MEANING
+from harness.metric import METRICS
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.runs.recordings import recording_path
@@ -47,7 +47,7 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
         )
     yield ""
     for name, value in row["metrics"].items():
-        yield f"  {name:30}{number(value):>9}  {MEANING.get(name, '')}"
+        yield f"  {name:30}{number(value):>9}  {METRICS[name].meaning if name in METRICS else ''}"
     yield ""
     yield "settings that are not the default's:"
     columns = by_column(settings)

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from harness.metric import METRICS
 from harness.runs.matrix import Matrix
 from harness.runs.store import reading
 from harness.settings.columns import by_column
-from harness.tables import METRICS
 
 
 class Line(NamedTuple):
@@ -60,7 +60,7 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
 class _Group:
     def __init__(self) -> None:
         self._outcomes: dict[str, int] = {}
-        self._values: dict[str, list[float]] = {name: [] for name in METRICS}
+        self._values: dict[str, list[float]] = {name: [] for name, m in METRICS.items() if m.in_short_tables}
 
     def add(self, outcome: str, metrics: Mapping[str, float | None]) -> None:
         self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1

@@ -13,19 +13,13 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from harness.metric import METRICS as ALL_METRICS
 from harness.plants.ladder import PLANTS, rung
 from harness.verdict.pairs import REFERENCE, change, ordered, pairs, settings_of, spread
 from harness.verdict.statistics import Effect, effect
 
-METRICS: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "convergence_time_s": ("convergence time", "s"),
-        "range_error_rms_m": ("settled error", "m rms"),
-        "range_error_peak_m": ("settled error", "m peak"),
-        "overshoot_m": ("overshoot", "m"),
-        "saturation_fraction": ("saturation", "share"),
-        "command_activity_deg_s2": ("command activity", "deg/s2"),
-    }
+METRICS: Mapping[str, tuple[str, str]] = MappingProxyType(  # what the law is judged by: its heading and unit
+    {m.name: (m.heading, m.label) for m in ALL_METRICS.values() if m.of_circling and m.in_short_tables}
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from harness.margins import Assess
-from harness.metric import MEANING
+from harness.metric import METRICS
 from harness.plants.ladder import BASELINE, rung
 from harness.verdict.attribution import Attribution, attributions
 from harness.verdict.pairs import FAILED, Pairs, axes, change, entered, ordered, plant_pairs, spread, varying
@@ -100,7 +100,7 @@ def _rows(paired: Pairs) -> Iterator[Row]:
         kinds.drop_duplicates().sort_values(["aircraft", "law", "plant"]).itertuples(index=False)
     ):
         those = paired.where((kinds == [aircraft, label, plant]).all(axis=1))
-        for metric in MEANING:
+        for metric in METRICS:
             reference, other = those.reference[metric].to_numpy(float), those.other[metric].to_numpy(float)
             if np.isnan(other).all():
                 continue

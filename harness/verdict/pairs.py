@@ -11,28 +11,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.error import HarnessError
-from harness.metric import MEANING
+from harness.metric import METRICS
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting
 
 LOST = (Outcome.GROUND.value, Outcome.DEPARTED.value, Outcome.TARGET_LOST.value)
 FAILED = tuple(outcome.value for outcome in Outcome if outcome.failed)
-OF_A_CIRCLE = frozenset(  # metrics that mean something only where the law circles its target
-    {
-        "convergence_time_s",
-        "range_error_final_m",
-        "range_error_rms_m",
-        "range_error_peak_m",
-        "overshoot_m",
-        "saturation_fraction",
-        "command_activity_deg_s2",
-    }
-)
 REFERENCE: Mapping[str, object] = MappingProxyType(  # what is undisturbed, by the columns of `spread`
     {"wind_speed_mps": 0.0, "wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
 )
-IDEAL: Mapping[str, float] = MappingProxyType({"heading_rate_gain": 1.0, "turn_ratio": 1.0})  # of the rest, zero
-BOUNDED: Mapping[str, float] = MappingProxyType({"saturation_fraction": 1.0})  # the worst that can be
 
 
 class CompareError(HarnessError, ValueError):
@@ -130,12 +117,13 @@ def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     table["convergence_time_s"] = table["convergence_time_s"].where(table["converged"], table["duration_s"])
     table["overshoot_m"] = table["overshoot_m"].fillna(0.0)
     table["range_error_final_m"] = table["range_error_final_m"].abs()
-    for metric in MEANING:
-        if metric == "convergence_time_s":
+    for name, metric in METRICS.items():
+        if name == "convergence_time_s" or metric.ideal is None:
             continue
-        measured = table[metric].dropna()
+        measured = table[name].dropna()
         has_it = table["plant"].isin(set(table["plant"][measured.index]))
-        table.loc[lost & has_it, metric] = BOUNDED.get(metric, _worst(measured, IDEAL.get(metric, 0.0)))
+        worst = _worst(measured, metric.ideal) if metric.worst is None else metric.worst
+        table.loc[lost & has_it, name] = worst
     return table
 
 
@@ -147,13 +135,13 @@ def _worst(measured: pd.Series, ideal: float) -> float:
 def change(pairs: Pairs, metric: str) -> NDArray[np.float64]:
     """Other minus reference, of a metric or another column; NaN where the pair says nothing of it.
 
-    That is where one of the flights has no such thing; of what is `OF_A_CIRCLE`, where the reference does not circle;
+    That is where one of the flights has no such thing; of what is `of_circling`, where the reference does not circle;
     of the convergence time, where both flights last and neither converges.
     """
     before, after = pairs.reference, pairs.other
     values = after[metric].to_numpy(float) - before[metric].to_numpy(float)
     says = np.ones(len(pairs), bool)
-    if metric in OF_A_CIRCLE:
+    if metric in METRICS and METRICS[metric].of_circling:
         says &= before["circles"].to_numpy(bool)
     if metric == "convergence_time_s":
         says &= (before["converged"] | after["converged"].to_numpy() | after["lost"].to_numpy()).to_numpy(bool)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from harness.metric import MEANING
+from harness.metric import METRICS as ALL_METRICS
 from harness.settings.written import written
 from harness.template import template
 from harness.verdict import figures, words
@@ -113,7 +113,7 @@ def _rendered(name: str, comparison: Comparison, origin: Origin) -> str:
 def _tables(comparison: Comparison) -> Iterator[Table]:
     for kind in dict.fromkeys((row.aircraft, row.law) for row in comparison.rows):
         those = [row for row in comparison.rows if (row.aircraft, row.law) == kind]
-        metrics: dict[str, dict[str, Row]] = {metric: {} for metric in MEANING}
+        metrics: dict[str, dict[str, Row]] = {metric: {} for metric in ALL_METRICS}
         for row in those:
             metrics[row.metric][row.plant] = row
         plants = [plant for plant in comparison.plants if any(row.plant == plant for row in those)]

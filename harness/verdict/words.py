@@ -9,8 +9,6 @@ from harness.verdict.pairs import REFERENCE
 from harness.verdict.scorecard import HOLDS, IF, NOT, UNMEASURED, UNSHOWN, Cell, Finding, Scorecard, shown
 from harness.verdict.statistics import Effect, Share
 
-UNITS = {"deg_s2": "deg/s2", "deg_s": "deg/s", "mps2": "m/s2", "mps": "m/s", "deg": "deg", "m": "m", "s": "s"}
-
 
 def answer(comparison: Comparison) -> list[str]:
     """Three sentences: does the assumption hold, what breaks first, what does it cost."""
@@ -150,11 +148,6 @@ def measured(value: float, finding: Finding) -> str:
     """A difference with its unit."""
     unit = finding.part.unit
     return signed(value) if unit == "1" else f"{signed(value)} {unit}"
-
-
-def unit_of(metric: str) -> str:
-    """The unit that a metric's name ends with."""
-    return next((unit for suffix, unit in UNITS.items() if metric.endswith(f"_{suffix}")), "1")
 
 
 # Lines for a terminal

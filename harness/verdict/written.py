@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from harness.metric import METRICS
 from harness.settings.written import written
 from harness.verdict.comparison import Comparison, Row, axes_of
 from harness.verdict.parts import Part
-from harness.verdict.words import answer, plain, signed, unit_of
+from harness.verdict.words import answer, plain, signed
 
 
 def as_document(comparison: Comparison) -> dict[str, Any]:
@@ -70,7 +71,7 @@ def as_csv(comparison: Comparison) -> str:
         change = row.difference
         numbers = (row.reference, row.other, change.mean, change.low, change.high)
         table.writerow(
-            [row.aircraft, row.law, row.plant, comparison.baseline, row.metric, unit_of(row.metric)]
+            [row.aircraft, row.law, row.plant, comparison.baseline, row.metric, METRICS[row.metric].unit]
             + ["" if x is None or math.isnan(x) else repr(x) for x in numbers]
             + [change.pairs, change.seeds, change.why]
         )
@@ -100,7 +101,7 @@ def _latex(comparison: Comparison) -> Iterator[str]:
 def _latex_cells(row: Row) -> Iterator[str]:
     change = row.difference
     yield _escaped(row.metric)
-    yield _escaped(unit_of(row.metric))
+    yield _escaped(METRICS[row.metric].unit)
     yield from (f"${plain(x)}$" if not math.isnan(x) else "--" for x in (row.reference, row.other))
     yield f"${signed(change.mean)}$" if not math.isnan(change.mean) else "--"
     yield (

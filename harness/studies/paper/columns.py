@@ -12,7 +12,7 @@ from autopilot.nftsm import Nftsm
 from autopilot.smc import Smc
 from harness.flight import Flight
 from harness.loop import simulate
-from harness.metric import metrics
+from harness.metric import measure
 from harness.plants.plant import Outcome
 from harness.plants.turn import bank_of_turn
 from harness.studies.paper.experiments import EKF, LAWS, Reading, Trace, ending, flight, flown
@@ -67,7 +67,7 @@ class Column(NamedTuple):
         log = simulate(self.real(self.held(one)))
         if log.outcome is not Outcome.COMPLETED:
             raise early(one, ending(log))
-        found = metrics(log)
+        found = measure(log)
         off = found["airspeed_deviation_rms_mps"]
         return {**found, "airspeed_deviation_rms_mps": None if off is None else off / self.scale}
 

@@ -1,0 +1,39 @@
+"""What a time series is summarised by: size, settling, overshoot. Arrays of one dimension; None where undefined."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def rms(x: Array) -> float | None:
+    """The root of the mean square; None of nothing, or of what is not all finite."""
+    return float(np.sqrt(np.mean(x * x))) if len(x) and np.isfinite(x).all() else None
+
+
+def peak(x: Array) -> float | None:
+    """The largest size; None of nothing, or of what is not all finite."""
+    return float(np.abs(x).max()) if len(x) and np.isfinite(x).all() else None
+
+
+def settling_time(time: Array, error: Array, tolerance: float, least: float) -> float | None:
+    """The first time after which |error| stays below `tolerance`; None when less than `least` seconds are left then.
+
+    `time` in s, increasing; `error` and `tolerance` in one unit. An error that is not finite is outside.
+    """
+    outside = np.flatnonzero(~(np.abs(error) < tolerance))
+    first = outside[-1] + 1 if outside.size else 0
+    if first >= len(time) or time[-1] - time[first] < least:
+        return None
+    return float(time[first])
+
+
+def overshoot(error: Array) -> float | None:
+    """The largest size of the sign that the error does not begin with; None when it never has that sign."""
+    beyond = error[error * error[0] < 0.0] if len(error) else error
+    return float(np.abs(beyond).max()) if beyond.size else None
+
+
+def azimuth(north: Array, east: Array) -> Array:
+    """The direction of a position, rad, clockwise from north, counted on beyond a whole turn."""
+    return np.unwrap(np.arctan2(east, north))
