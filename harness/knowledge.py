@@ -1,4 +1,4 @@
-"""Sensor and estimator of a flight: what the law knows of the target, and when."""
+"""What the law knows of the target at each guidance step: from a sensor and a filter, or from the truth itself."""
 
 import math
 from collections.abc import Callable
@@ -9,30 +9,40 @@ from harness.plants.plant import End, Outcome
 from harness.world.randomness import stream
 from harness.world.target import TargetState
 
+NO_MEASUREMENT = Measurement(math.nan, math.nan)
+
 
 class Estimation:
-    """Sensor and estimator in flight: what the law knows of the target at each guidance step, and the log's rows."""
+    """The sensor and the filter of one flight: the estimated target at each guidance step.
+
+    `rows` holds one tuple per guidance step, for the log: the filter's `Estimate`, then the latest innovation (NaN in a
+    step without a new measurement).
+    """
 
     def __init__(self, flight: Flight, target: Callable[[float], TargetState]) -> None:
+        """`target` gives the true state at a time in s: measurements may fall between two guidance steps."""
         self.rows: list[tuple[float, ...]] = []
         self._target = target
-        self._measure, self._tracker = sensor(flight.estimator, flight.seed), flight.estimator.start()
+        self._measure, self._filter = sensor(flight.estimator, flight.seed), flight.estimator.start()
         self._step, self._period = flight.step, flight.estimator.period
-        self._guidance_steps = round(flight.guidance_period / flight.step)
-        self._sample_steps = round(flight.estimator.period / flight.step)
-        self._due = 0  # the number of the next measurement
+        self._steps_per_guidance = round(flight.guidance_period / flight.step)
+        self._steps_per_measurement = round(flight.estimator.period / flight.step)
+        self._measurements = 0  # taken so far; the next one has this number
 
-    def at(self, k: int) -> TargetState:
-        """At the k-th guidance step, after the measurements due by then. Its acceleration and turn rate are unknown: 0.
+    def at(self, k: int, truth: TargetState) -> TargetState:
+        """The estimated target at the k-th guidance step, after all measurements due by then; SI, rad, north-east.
 
-        Time is counted in steps. A filter's fault is a flight's outcome: `End`.
+        Its acceleration and turn rate are 0, for the filter estimates neither. `truth`, the target at this moment, is
+        not used: the sensor measures at its own instants, counted in simulation steps. Raises `End` when the filter
+        fails or diverges: that is an outcome of the flight.
         """
-        now, innovation = k * self._guidance_steps, Measurement(math.nan, math.nan)
+        now, innovation = k * self._steps_per_guidance, NO_MEASUREMENT
         try:
-            while self._due * self._sample_steps <= now:
-                innovation = self._tracker.update(self._measure(self._target(self._due * self._period)))
-                self._due += 1
-            estimate = self._tracker.at((now - (self._due - 1) * self._sample_steps) * self._step)
+            while self._measurements * self._steps_per_measurement <= now:
+                innovation = self._filter.update(self._measure(self._target(self._measurements * self._period)))
+                self._measurements += 1
+            age = (now - (self._measurements - 1) * self._steps_per_measurement) * self._step
+            estimate = self._filter.at(age)
         except Exception as error:
             raise End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}") from error
         if not all(map(math.isfinite, estimate)):
@@ -41,14 +51,19 @@ class Estimation:
         return TargetState(*estimate[:4])
 
 
-def told(estimator: Estimator) -> Callable[[TargetState], TargetState] | None:
-    """What a law that is told the truth does not get to know: it is zero to it. None when it is told everything."""
-    hidden = {f"target_{name}": 0.0 for name in ("acceleration", "turn_rate") if getattr(estimator, name) == "unknown"}
-    return (lambda truth: truth._replace(**hidden)) if hidden else None
+def perfect_estimator(settings: Estimator) -> Callable[[int, TargetState], TargetState]:
+    """The estimator of `kind = "truth"`: the true target, with 0 for each part that `settings` calls unknown."""
+    unknown = {f"target_{name}": 0.0 for name in ("acceleration", "turn_rate") if getattr(settings, name) == "unknown"}
+    if unknown:
+        return lambda k, truth: truth._replace(**unknown)
+    return lambda k, truth: truth
 
 
 def sensor(estimator: Estimator, seed: int) -> Callable[[TargetState], Measurement]:
-    """The estimator's sensor: range and azimuth of a target, with white Gaussian noise that the seed alone decides."""
+    """The sensor: from the true target to a noisy range (m) and azimuth (rad, clockwise from north).
+
+    The noise is white and Gaussian, with the variances of `estimator`; it depends on `seed` alone.
+    """
     noise, position = stream(seed, "sensor"), estimator.sensor_position
     range_deviation, azimuth_deviation = math.sqrt(estimator.range_variance), math.sqrt(estimator.azimuth_variance)
 

@@ -312,7 +312,7 @@ def test_what_falls_due_between_two_looks_is_measured_at_its_own_time() -> None:
     one = flight()
     at: Callable[[float], TargetState] = one.target.start()
     each, only_last = Estimation(one, at), Estimation(one, at)
-    assert [each.at(k) for k in range(38)][-1] == only_last.at(37)
+    assert [each.at(k, at(0.05 * k)) for k in range(38)][-1] == only_last.at(37, at(1.85))
 
 
 def test_who_knows_the_truth_loads_no_filter() -> None:
