@@ -12,6 +12,7 @@ from autopilot.quantities import About
 from harness.margins import Assess
 from harness.settings import SettingsError, load_flight, read_settings, settings_from_text
 from harness.settings.written import written
+from harness.verdict.parts import PARTS
 
 FILE = """\
 [flight]
@@ -38,6 +39,13 @@ def test_margins_come_from_the_file_in_its_units_and_the_rest_by_default(file: P
 
 def test_a_margin_is_overridden_by_its_key(file: Path) -> None:
     assert read_settings(file, ["assess.sideslip_deg=1"]).assess().sideslip == pytest.approx(math.radians(1.0))
+
+
+def test_a_part_reads_its_margin_in_the_unit_of_the_file_which_is_that_of_its_metric() -> None:
+    part = next(part for part in PARTS if part.threshold == "sideslip_deg")
+    assert part.column == "sideslip_rms_deg"
+    assert part.bounds(Assess(sideslip=math.radians(3.0))) == (None, pytest.approx(3.0))
+    assert {part.threshold for part in PARTS} <= set(written(Assess()))
 
 
 def test_margins_are_read_though_the_flight_beside_them_is_unknown_today() -> None:

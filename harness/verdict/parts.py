@@ -12,6 +12,7 @@ import aircraft
 from harness.margins import Assess
 from harness.plants.ladder import PLANTS
 from harness.plants.turn import banks_of_turns
+from harness.settings.written import written
 from harness.verdict.pairs import Pairs, change
 
 Bounds = tuple[float | None, float | None]
@@ -25,12 +26,16 @@ class Part:
     title: str
     column: str
     unit: str
-    bounds: Callable[[Assess], Bounds]  # of the difference, in the column's unit
+    threshold: str  # the key in [assess], in the column's unit
+    allowed: Callable[[float], Bounds]  # of the difference, in the column's unit, by the threshold
     assumed: float | None = None  # what the assumption says it is; None: what the baseline flew
     relative: bool = False  # bounds are shares of the baseline's value
-    threshold: str = ""  # the key in [assess]
     consequence: bool = False
     tested: bool = True  # False: a setting, or a share of flights, of which a cell has too few for a test
+
+    def bounds(self, assess: Assess) -> Bounds:
+        """What the difference has to stay within, in the column's unit, which is that of the threshold in a file."""
+        return self.allowed(written(assess)[self.threshold])
 
     def difference(self, pairs: Pairs) -> NDArray[np.float64]:
         """Other minus what is assumed of it; NaN where the pair says nothing."""
@@ -39,73 +44,74 @@ class Part:
         return pairs.other[self.column].to_numpy(float) - self.assumed
 
 
-def _up_to(limit: Callable[[Assess], float]) -> Callable[[Assess], Bounds]:
-    return lambda assess: (None, limit(assess))
+def _up_to(threshold: float) -> Bounds:
+    return None, threshold
 
 
-def _within(margin: Callable[[Assess], float]) -> Callable[[Assess], Bounds]:
-    return lambda assess: (-margin(assess), margin(assess))
+def _within(threshold: float) -> Bounds:
+    return -threshold, threshold
+
+
+def _reserve(threshold: float) -> Bounds:
+    return None, -threshold
 
 
 PARTS: tuple[Part, ...] = (
     Part(
         "airspeed", "constant airspeed", "airspeed_deviation", "of nominal, rms",
-        _up_to(lambda a: a.airspeed_deviation), 0.0, threshold="airspeed_deviation",
+        "airspeed_deviation", _up_to, 0.0,
     ),
     Part(
         "gain", "heading rate followed (gain)", "heading_rate_gain", "of the command",
-        _within(lambda a: a.heading_rate_gain), 1.0, threshold="heading_rate_gain",
+        "heading_rate_gain", _within, 1.0,
     ),
     Part(
         "lag", "heading rate followed (lag)", "heading_rate_lag_s", "s",
-        _up_to(lambda a: a.heading_rate_lag), 0.0, threshold="heading_rate_lag_s",
+        "heading_rate_lag_s", _up_to, 0.0,
     ),
     Part(
         "lag_k2", "heading rate followed (lag x k2)", "lag_times_k2", "1",
-        _up_to(lambda a: a.lag_times_k2), 0.0, threshold="lag_times_k2",
+        "lag_times_k2", _up_to, 0.0,
     ),
     Part(
         "sideslip", "zero sideslip", "sideslip_rms_deg", "deg rms",
-        _up_to(lambda a: math.degrees(a.sideslip)), 0.0, threshold="sideslip_deg",
+        "sideslip_deg", _up_to, 0.0,
     ),
     Part(
         "level", "level flight", "altitude_deviation_peak_m", "m peak",
-        _up_to(lambda a: a.altitude_deviation), 0.0, threshold="altitude_deviation_m",
+        "altitude_deviation_m", _up_to, 0.0,
     ),
     Part(
         "turn", "turn relation g tan(bank)/V", "turn_ratio", "of the relation",
-        _within(lambda a: a.turn_ratio), 1.0, threshold="turn_ratio",
+        "turn_ratio", _within, 1.0,
     ),
     Part(
         "reach", "rate limit within reach of the bank limit", "bank_beyond_deg", "deg beyond the bank limit",
-        _up_to(lambda a: -math.degrees(a.bank_reserve)), 0.0, threshold="bank_reserve_deg", tested=False,
+        "bank_reserve_deg", _reserve, 0.0, tested=False,
     ),
     Part(
         "alive", "flights that last", "lost_share", "of the flights lost",
-        _up_to(lambda a: a.lost_share), 0.0, threshold="lost_share", consequence=True, tested=False,
+        "lost_share", _up_to, 0.0, consequence=True, tested=False,
     ),
     Part(
         "convergence", "convergence itself", "converged_share", "of the flights",
-        _within(lambda a: a.convergence_share_margin), threshold="convergence_share_margin", consequence=True,
-        tested=False,
+        "convergence_share_margin", _within, consequence=True, tested=False,
     ),
     Part(
         "convergence_time", "convergence time", "convergence_time_s", "s",
-        _within(lambda a: a.convergence_time_margin), relative=True,
-        threshold="convergence_time_margin", consequence=True,
+        "convergence_time_margin", _within, relative=True, consequence=True,
     ),
     Part(
         "settled_error", "settled error", "range_error_rms_m", "m rms",
-        _within(lambda a: a.range_error_margin), threshold="range_error_margin_m", consequence=True,
+        "range_error_margin_m", _within, consequence=True,
     ),
     Part(
         "saturation", "saturation", "saturation_fraction", "of the last half",
-        _within(lambda a: a.saturation_margin), threshold="saturation_margin", consequence=True,
+        "saturation_margin", _within, consequence=True,
     ),
     Part(
         "activity", "command activity", "command_activity_deg_s2", "deg/s2",
-        _within(lambda a: math.degrees(a.command_activity_margin)),
-        threshold="command_activity_margin_deg_s2", consequence=True,
+        "command_activity_margin_deg_s2", _within, consequence=True,
     ),
 )  # fmt: skip
 
