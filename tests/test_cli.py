@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli._input import BadInput, flight_of, read_file, writable, writable_folder
+from harness.cli._input import BadInput, flight_of, read_file
+from harness.cli._paths import writable, writable_folder
 from tests.builders import command, copied_airframe, invoke, python, words_of, write
 
 FILE = """\

@@ -1,67 +1,97 @@
-"""The main job, flown whole: what it prints and what it records."""
+"""`harness demo`: the shipped experiment flown, compared and recorded by the ordinary machinery."""
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
-from harness.cli import _demo as demo
 from harness.log import COLUMNS
-from harness.plants.plant import Outcome
-from harness.review.reading import read_recording
+from harness.review.reading import read_logs, read_recording
+from harness.runs.recordings import recording_path
+from harness.runs.results import load_results
 from harness.tables import number
-
-Flights = list[demo.Flown]
+from tests.builders import invoke
 
 
 @pytest.fixture(scope="module")
-def flown() -> Flights:
-    return list(demo.fly_all())
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("demo")
 
 
-def of(flown: Flights, case: str) -> Flights:
-    return [one for one in flown if one.case.name == case]
+@pytest.fixture(scope="module")
+def said(out: Path) -> str:
+    done = invoke("demo", "--out", out)
+    assert done.exit_code == 0, done.output
+    return done.stdout
 
 
-def test_every_flight_of_the_main_job_is_flown_to_its_end(flown: Flights) -> None:
-    assert len(flown) == 3 * 2 * 3
-    assert {one.log.outcome for one in flown} == {Outcome.COMPLETED}
+@pytest.fixture(scope="module")
+def flown(out: Path, said: str) -> pd.DataFrame:
+    """Its flights, by wind, limit, law, airframe and plant."""
+    results = load_results(out)
+    results["wind"] = results["wind.steady_mps"].map(lambda wind: wind[0])
+    by = ["wind", "law.max_heading_rate_deg_s", "law.name", "aircraft", "plant"]
+    results = results.set_index(by).sort_index()
+    assert results.index.is_unique
+    return results
 
 
-def test_a_table_has_a_line_per_flight_that_ends_in_its_metrics(flown: Flights) -> None:
-    for case in demo.CASES:
-        those = of(flown, case.name)
-        *_, rule = [i for i, line in enumerate(demo.lines(those)) if line.startswith("---")]
-        lines = list(demo.lines(those))[rule + 1 :]
-        for one, line in zip(those, lines, strict=True):
-            law, plant, settles, *_, sideslip = line.split()
-            assert (law, plant) == (one.law, one.plant)
-            assert settles == number(one.metrics["convergence_time_s"])
-            assert sideslip == number(one.metrics["sideslip_peak_deg"])
+def test_two_laws_fly_three_cases_on_three_aircraft_to_the_end(flown: pd.DataFrame) -> None:
+    cases = {(0.0, 5.0), (3.0, 5.0), (3.0, 8.0)}
+    laws, airframes = ("nftsm", "smc"), ("ultra_stick_25e", "skywalker_x8")
+    assert set(flown.index) == {
+        (*case, law, airframe, plant)
+        for case in cases
+        for law in laws
+        for airframe in airframes
+        for plant in ("kinematic", "sixdof")
+    }
+    assert set(flown["outcome"]) == {"completed"}
+    assert set(flown["law.gains"]) == {"paper_1", "paper"}
 
 
-def test_the_sentences_say_by_how_much_the_plants_differ(flown: Flights) -> None:
-    those = of(flown, "still-air")
-    times = [one.metrics["convergence_time_s"] for one in those if one.law == "NFTSM_1"]
-    nftsm, smc = demo.differences(those)
-    assert nftsm.startswith(f"NFTSM_1 settles in {times[0]:.1f} s on the kinematic aircraft, ")
-    assert f"in {times[1]:.1f} s on ultra_stick_25e ({times[1] - times[0]:+.1f} s)" in nftsm
-    assert "it chatters" in nftsm
-    assert "it chatters" not in smc
+def test_the_table_has_a_line_for_each_flight_with_its_metrics(flown: pd.DataFrame, said: str) -> None:
+    lines = [line.split() for line in said.splitlines() if " of 1 " in line]
+    assert len(lines) == len(flown)
+    for (_, limit, law, airframe, plant), row in flown.iterrows():
+        (line,) = (
+            words
+            for words in lines
+            if {law, airframe, plant} <= set(words)
+            and f"[{row['wind.steady_mps'][0]:g}," in words
+            and f"{limit:g}" in words[:6]
+        )
+        settles = row["convergence_time_s"]
+        assert number(None if pd.isna(settles) else settles) in line
+        assert line[-1] == ("-" if plant == "kinematic" else number(row["sideslip_peak_deg"]))
 
 
-def test_an_infeasible_circle_is_called_so_with_how_far_every_plant_leaves_it(flown: Flights) -> None:
-    infeasible, nftsm, smc = demo.differences(of(flown, "wind-5"))
-    assert infeasible.startswith("Infeasible: holding the circle in this wind takes up to 5.64 deg/s, the limit is 5.")
-    for sentence, law in ((nftsm, "NFTSM_1"), (smc, "SMC")):
-        peaks = [one.metrics["range_error_peak_m"] for one in of(flown, "wind-5") if one.law == law]
-        assert min(peaks) > 20.0
-        assert all(f"by {peak:.1f} m on " in sentence for peak in peaks)
-    assert "Infeasible" not in " ".join(demo.differences(of(flown, "wind-8")))
+def test_in_still_air_nftsm_settles_later_on_an_airframe_and_keeps_moving_its_invoke(flown: pd.DataFrame) -> None:
+    still = flown.loc[(0.0, 5.0)]
+    settles, activity = still["convergence_time_s"], still["command_activity_deg_s2"]
+    for airframe in ("ultra_stick_25e", "skywalker_x8"):
+        assert settles["nftsm", airframe, "sixdof"] > settles["nftsm", airframe, "kinematic"] + 10.0
+        assert activity["nftsm", airframe, "sixdof"] > 100.0 * activity["nftsm", airframe, "kinematic"]
+        assert activity["smc", airframe, "sixdof"] < 0.01
 
 
-def test_a_pair_is_recorded_with_both_aircraft_to_the_last_bit(flown: Flights, tmp_path: Path) -> None:
-    pair = [one for one in of(flown, "wind-8") if one.law == "SMC" and one.plant != "skywalker_x8"]
-    (path,) = demo.record_pairs(pair, tmp_path)
-    for one in pair:
-        assert (read_recording(path, one.plant)["range_error"].to_numpy() == one.log["range_error"]).all()
-    assert list(read_recording(path, "kinematic").columns) == list(COLUMNS)
+def test_a_circle_that_cannot_be_held_is_warned_of_and_left_on_every_aircraft(flown: pd.DataFrame, out: Path) -> None:
+    margin = flown["feasibility_margin_deg_s"]
+    assert set(margin.loc[(3.0, 5.0)].round(2)) == {-0.64}
+    assert (flown.loc[(3.0, 5.0)]["range_error_peak_m"] > 20.0).all()
+    assert (margin.loc[(3.0, 8.0)] > 0.0).all()
+    again = invoke("demo", "--out", out)
+    assert "0 flown, 24 earlier" in again.stdout
+
+
+def test_every_flight_is_recorded_and_a_pair_opens_as_the_output_says(
+    flown: pd.DataFrame, out: Path, said: str, tmp_path: Path
+) -> None:
+    for row in flown.itertuples():
+        (log,) = read_logs(recording_path(out, row.key)).values()
+        assert log.digest == row.digest
+    assert list(read_recording(recording_path(out, flown["key"].iloc[0])).columns) == list(COLUMNS)
+    (line,) = (line for line in said.splitlines() if " harness view " in line)
+    words = line.partition(" harness ")[2].split()
+    assert invoke(*words, "--save", tmp_path / "pair.rrd").exit_code == 0
+    assert {"kinematic", "sixdof"} <= set(read_logs(tmp_path / "pair.rrd"))

@@ -304,10 +304,14 @@ def test_a_dry_run_tells_the_size_and_writes_nothing(file: Path, tmp_path: Path)
         "  plant: 2 values",
         "  start.heading_deg: drawn from the seed",
     ]
-    assert lines[6].startswith("10 circles are INFEASIBLE")
-    assert lines[7].startswith("about 1 s with ")
+    assert lines[6].startswith("about 1 s with ")
+    assert "warning: 10 of 10 flights: the circle is infeasible" in done.stderr
+    assert "warning: 10 of 10 flights: Eq. (28)" in done.stderr
     assert list(tmp_path.iterdir()) == [file]
-    assert "change nothing" in command("run", file, "--dry-run", "--set", "start.heading_deg=3.0").stderr
+    assert (
+        "the 5 seeds repeat the same flight"
+        in command("run", file, "--dry-run", "--set", "start.heading_deg=3.0").stderr
+    )
     checked = command("check", file)
     assert checked.returncode == 0
     assert checked.stdout.splitlines()[-1] == f"{file}: ok"

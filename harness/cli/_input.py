@@ -1,12 +1,9 @@
-"""What several commands do alike: bad input told, files read and places tried."""
+"""What the user gave: the command line as typed, the settings file and its flight, and the error for what is wrong."""
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
-import tempfile
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -18,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class BadInput(click.ClickException):
-    """What the user gave cannot be used: its text, as it is, on stderr; exit code 2."""
+    """What the user gave cannot be used: the message alone goes to stderr; exit code 2."""
 
     exit_code = 2
 
@@ -27,7 +24,7 @@ class BadInput(click.ClickException):
 
 
 def read_file(path: Path, overrides: tuple[str, ...]) -> SettingsFile:
-    """The file as read."""
+    """The file as read. Raises `BadInput`."""
     from harness.settings import SettingsError, read_settings
 
     try:
@@ -37,7 +34,7 @@ def read_file(path: Path, overrides: tuple[str, ...]) -> SettingsFile:
 
 
 def flight_of(file: SettingsFile) -> Flight:
-    """The flight that a file describes, once put to its start: what cannot start is bad input."""
+    """The flight that a file describes. Its start is tried: a flight that cannot start raises `BadInput`."""
     from harness.checks import try_start
     from harness.plants.plant import PlantError
     from harness.settings import SettingsError
@@ -54,48 +51,5 @@ def flight_of(file: SettingsFile) -> Flight:
 
 
 def typed() -> str:
-    """The command as it was typed."""
+    """The command as the user typed it."""
     return shlex.join(["harness", *sys.argv[1:]])
-
-
-def busy(what: str) -> AbstractContextManager[object]:
-    """Says on a terminal what takes its time."""
-    from rich.console import Console
-
-    terminal = Console(stderr=True)
-    return terminal.status(what) if terminal.is_terminal else nullcontext()
-
-
-def writable(path: Path) -> Path:
-    """The path, if a file can be made there."""
-    folder = path.parent
-    try:
-        if path.is_dir():
-            raise BadInput(f"{path}: is a folder, not a file")
-        if not folder.is_dir():
-            raise BadInput(f"{path}: there is no folder {folder}")
-        if path.exists() and not path.is_file():
-            raise BadInput(f"{path}: is there, and no file that can be replaced")
-        if path.exists() and not (os.access(path, os.W_OK) and path.stat().st_mode & 0o222):
-            raise BadInput(f"{path}: is there, and write-protected")
-        _probe(folder)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
-    return path
-
-
-def writable_folder(path: Path) -> Path:
-    """The folder, made if need be, if files can be made in it."""
-    try:
-        if path.exists() and not path.is_dir():
-            raise BadInput(f"{path}: is a file, not a folder")
-        path.mkdir(parents=True, exist_ok=True)
-        _probe(path)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written to: {error.strerror}") from None
-    return path
-
-
-def _probe(folder: Path) -> None:
-    with tempfile.TemporaryFile(dir=folder):
-        pass

@@ -7,16 +7,19 @@ import click
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
 def check(file: Path, overrides: tuple[str, ...]) -> None:
-    """Validate FILE without flying: every error with its line, then the warnings. A matrix is checked whole.
+    """Check a settings file without flying it.
+
+    Prints every mistake with its line, what is wrong and what is allowed; the warnings; and whether the circle can be
+    held. Every flight of a matrix is checked.
 
     \b
     Example:
       harness check experiments/stationary.toml
     """
     from harness.cli._input import BadInput, flight_of, read_file
-    from harness.cli._progress import surveyed, tell_survey
+    from harness.cli._matrix import print_survey, surveyed
     from harness.feasibility import feasibility_line, warnings
     from harness.runs.matrix import read_matrix
     from harness.settings import SettingsError
@@ -25,12 +28,12 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
     if settings.document.get("matrix"):
         try:
             matrix = read_matrix(settings)
-            tell_survey(matrix, surveyed(matrix), 0)
+            print_survey(matrix, surveyed(matrix), 0)
         except SettingsError as error:
             raise BadInput(str(error)) from None
     else:
         flight = flight_of(settings)
         click.echo(feasibility_line(flight))
         for warning in warnings(flight):
-            click.echo(f"warning: {warning}")
+            click.echo(f"warning: {warning}", err=True)
     click.echo(f"{file}: ok")

@@ -26,7 +26,7 @@ def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: st
     import json
 
     from harness.cli._comparison import read_comparison
-    from harness.cli._input import busy
+    from harness.cli._progress import busy
     from harness.verdict.words import lines
     from harness.verdict.written import as_csv, as_document, as_latex
 

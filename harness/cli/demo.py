@@ -1,47 +1,53 @@
-"""`harness demo`: the main job on the paper's own case."""
+"""`harness demo`: a shipped experiment, flown and compared as any other."""
 
 from pathlib import Path
 
 import click
 
+EXPERIMENT = Path(__file__).with_name("demo.toml")
+
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/demo"), show_default=True)
 def demo(out: Path) -> None:
-    """The paper's stationary target, two laws, three aircraft: tables, sentences, and a Rerun recording per pair.
+    """Fly the paper's first case, two laws on three aircraft, and compare.
+
+    The aircraft are the paper's kinematic one and two JSBSim airframes. Prints the table of results of `harness run`,
+    the answer of `harness compare`, and how to view a flight on both. All flights are recorded in OUT/flights.
+    Takes about 20 s.
 
     \b
     Example:
       harness demo --out out/demo
     """
-    import textwrap
+    import os
 
-    from rich.console import Console
-    from rich.progress import Progress
+    from harness.cli._comparison import read_comparison
+    from harness.cli._input import BadInput
+    from harness.cli._matrix import fly_matrix, print_survey, surveyed
+    from harness.runs.matrix import read_matrix
+    from harness.runs.run import Options, positions_done
+    from harness.runs.store import StoreError
+    from harness.runs.workers import WorkersError
+    from harness.settings import read_settings
+    from harness.verdict.words import answer
 
-    from harness.cli import _demo as job
-    from harness.cli._input import writable_folder
-
-    writable_folder(out)
-    terminal = Console(stderr=True)
-    flown, written = [], []
-    pairs = len(job.CASES) * len(job.LAWS) * len(job.AIRFRAMES)
-    with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as progress:
-        flying = progress.add_task("flying", total=pairs + len(job.CASES) * len(job.LAWS))
-        for one in job.fly_all():
-            flown.append(one)
-            progress.advance(flying)
-        recording = progress.add_task("recording", total=pairs)
-        for path in job.record_pairs(flown, out):
-            written.append(path)
-            progress.advance(recording)
-
-    for case in job.CASES:
-        those = [one for one in flown if one.case is case]
-        click.secho(case.title, bold=True)
-        for line in job.lines(those):
-            click.echo(f"  {line}")
-        for sentence in job.differences(those):
-            click.echo(textwrap.fill(sentence, 110, initial_indent="- ", subsequent_indent="  "))
-        click.echo()
-    click.echo(f"{len(written)} recordings in {out}. To open one: .venv/bin/harness view {written[0]}")
+    try:
+        matrix = read_matrix(read_settings(EXPERIMENT))
+        done = positions_done(matrix, out, retry_failed=False)
+        print_survey(matrix, surveyed(matrix, done=done), len(done))
+        progress = fly_matrix(matrix, out, Options(workers=os.cpu_count() or 1, log="all"))
+    except (StoreError, WorkersError) as error:
+        raise BadInput(str(error)) from None
+    click.echo()
+    comparison, _ = read_comparison(out, "kinematic", ())
+    for sentence in answer(comparison):
+        click.echo(sentence)
+    key = comparison.pairs.other["key"].iloc[0][:8]
+    click.echo(
+        f"\nthe whole comparison: harness compare {out}\n"
+        f"the first pair in the viewer: harness view {out} --pair {key}\n"
+        f"all flights and their keys: harness show {out}\n"
+        f"the experiment, to copy and change: {EXPERIMENT}"
+    )
+    raise SystemExit(1 if progress.failed else 0)

@@ -28,7 +28,7 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
       harness export out/wind:3f2a --to csv
       harness export flight.rrd --to parquet --out flight.parquet
     """
-    from harness.cli._input import writable
+    from harness.cli._paths import writable
     from harness.files import replacing
 
     table, name = _table(what, flight)

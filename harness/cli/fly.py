@@ -44,7 +44,8 @@ def fly(
     """
     import json
 
-    from harness.cli._input import BadInput, flight_of, read_file, typed, writable
+    from harness.cli._input import BadInput, flight_of, read_file, typed
+    from harness.cli._paths import writable
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
     from harness.loop import simulate

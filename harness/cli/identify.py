@@ -27,7 +27,8 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     from aircraft import identified as file_of
     from aircraft import limits
     from harness.checks import airframe_of
-    from harness.cli._input import BadInput, writable, writable_folder
+    from harness.cli._input import BadInput
+    from harness.cli._paths import writable, writable_folder
     from harness.files import replacing
     from harness.identification import identify as job
     from harness.identification.figures import bode_plot, step_plot

@@ -1,55 +1,99 @@
 """The command line: `harness COMMAND`. Exit codes: 0 ok, 1 a flight failed, 2 bad input, 130 interrupted."""
 
+from __future__ import annotations
+
+import importlib
 import sys
 import warnings
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 import click
 
 from harness.cli._stdout import guard
-from harness.cli.check import check
-from harness.cli.compare import compare
-from harness.cli.demo import demo
-from harness.cli.doctor import doctor
-from harness.cli.export import export
-from harness.cli.fly import fly
-from harness.cli.identify import identify
-from harness.cli.list import list_
-from harness.cli.predict import predict
-from harness.cli.report import report
-from harness.cli.reproduce import reproduce
-from harness.cli.run import run
-from harness.cli.show import show
-from harness.cli.view import view
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+class Entry(NamedTuple):
+    """A command before it is imported."""
+
+    where: str  # module:attribute, the module in this folder
+    sentence: str  # what the command does: the first line of its own help
+
+
+COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
+    {
+        "One flight": {
+            "fly": Entry("fly:fly", "Fly one flight and print its metrics."),
+            "check": Entry("check:check", "Check a settings file without flying it."),
+            "predict": Entry("predict:predict", "Predict the limit cycle of a flight without flying it."),
+            "view": Entry("view:view", "Open flights in the Rerun viewer."),
+            "export": Entry("export:export", "Write the log of a flight as a CSV or Parquet table."),
+        },
+        "Many flights": {
+            "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),
+            "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
+            "compare": Entry("compare:compare", "Compare the flights of a run that differ in the plant alone."),
+            "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
+        },
+        "The paper": {
+            "demo": Entry("demo:demo", "Fly the paper's first case, two laws on three aircraft, and compare."),
+            "reproduce": Entry("reproduce:reproduce", "Fly the paper's simulations and check its claims."),
+        },
+        "Airframes and installation": {
+            "list": Entry("list:list_", "List the laws, aircraft, plants, metrics or margins."),
+            "identify": Entry("identify:identify", "Identify how an airframe follows a heading-rate command."),
+            "doctor": Entry("doctor:doctor", "Check this installation: versions, wind and units."),
+        },
+    }
+)
+
+
+def load(name: str) -> click.Command:
+    """The command of this name, imported."""
+    module, _, attribute = _ENTRIES[name].where.partition(":")
+    command: click.Command = getattr(importlib.import_module(f"harness.cli.{module}"), attribute)
+    return command
+
+
+class LazyGroup(click.Group):
+    """Knows the commands by name and sentence, and imports the one that is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)  # as they are declared
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name, known, rest = super().resolve_command(ctx, args)
+        return name, known and load(args[0]), rest
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        width = max(map(len, self.commands))
+        for heading, entries in COMMANDS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), entry.sentence) for name, entry in entries.items()])
+
+
+_ENTRIES = {name: entry for entries in COMMANDS.values() for name, entry in entries.items()}
+
+
+@click.group(
+    cls=LazyGroup,
+    commands={name: click.Command(name, short_help=entry.sentence) for name, entry in _ENTRIES.items()},
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
 @click.version_option(package_name="standoff-harness")
 def harness() -> None:
-    """Fly a guidance law on the kinematic aircraft it was proved on, and on a JSBSim aircraft in wind.
+    """Fly a guidance law on the kinematic aircraft that it was proved on and on a JSBSim aircraft in wind.
 
     \b
-    Example:
+    Examples:
+      harness demo
       harness fly experiments/stationary.toml --set plant=kinematic
+      harness run experiments/wind.toml --out out/wind
+      harness compare out/wind
     """
-
-
-for command in (
-    fly,
-    run,
-    show,
-    view,
-    export,
-    compare,
-    report,
-    check,
-    list_,
-    demo,
-    reproduce,
-    identify,
-    predict,
-    doctor,
-):
-    harness.add_command(command)
 
 
 def main() -> None:
@@ -59,7 +103,7 @@ def main() -> None:
     try:
         code = harness.main(standalone_mode=False)
     except click.ClickException as error:
-        _tell(error)
+        _print_error(error)
         code = error.exit_code
     except OSError as error:
         if error.filename is None:
@@ -72,8 +116,8 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _tell(error: click.ClickException) -> None:
-    """On one line, also what Click tells on several; a command without a word is told how it is used."""
+def _print_error(error: click.ClickException) -> None:
+    """On one line, also what Click prints on several; the command without any argument prints its help."""
     if isinstance(error, click.UsageError) and not isinstance(error, click.exceptions.NoArgsIsHelpError):
         command = error.ctx.command_path if error.ctx else "harness"
         message = " ".join(error.format_message().split()).rstrip(".")

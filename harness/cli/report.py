@@ -20,7 +20,9 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
       harness report out/assumption --markdown docs/results.md
     """
     from harness.cli._comparison import read_comparison
-    from harness.cli._input import BadInput, busy, writable
+    from harness.cli._input import BadInput
+    from harness.cli._paths import writable
+    from harness.cli._progress import busy
     from harness.files import replacing
     from harness.verdict import report as job
 

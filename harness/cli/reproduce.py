@@ -25,7 +25,7 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
       harness reproduce --out out/paper
       harness reproduce --out out/paper --sixdof
     """
-    from harness.cli._input import writable, writable_folder
+    from harness.cli._paths import writable, writable_folder
     from harness.files import replacing
     from harness.studies.paper import documents, job, ledger
     from harness.studies.paper import reproduce as numbers

@@ -36,7 +36,8 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
     """
     import tempfile
 
-    from harness.cli._input import BadInput, typed, writable
+    from harness.cli._input import BadInput, typed
+    from harness.cli._paths import writable
 
     if what is None:
         if flights or pair or save:

@@ -1,10 +1,10 @@
-"""What a matrix comes to, before it is flown: every mistake in it, its size, what is infeasible, how long it takes."""
+"""The size of a matrix before it is flown: every mistake in it, its warnings, how long it takes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from harness.checks import try_start
-from harness.feasibility import feasibility_margin
+from harness.feasibility import warnings
 from harness.flight import Flight
 from harness.plants.plant import PlantError
 from harness.runs.matrix import Combination, Matrix
@@ -22,12 +22,12 @@ class Survey:
     """The size of a matrix. Counts are of flights."""
 
     flights: int = 0
-    infeasible: int = 0
     random: int = 0  # whose seed matters
     seconds: float = 0.0  # estimated, of one process
     periods: int = 0  # guidance periods, of all flights together
     mistakes: list[str] = field(default_factory=list)
     varies: dict[str, int] = field(default_factory=dict)  # the number of values of each axis
+    warnings: dict[str, int] = field(default_factory=dict)  # how many flights each is about
 
     @property
     def idle_seeds(self) -> int:
@@ -69,7 +69,8 @@ def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = froz
             if len(found.mistakes) >= _MOST_MISTAKES:
                 break
             continue
-        found.infeasible += one.infeasible
+        for warning in one.warnings:
+            found.warnings[warning] = found.warnings.get(warning, 0) + 1
         found.random += one.random or bool(matrix.draws)
         found.seconds += one.seconds
         found.periods += one.periods
@@ -85,7 +86,7 @@ def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = froz
 class _One:
     """What one flight comes to."""
 
-    infeasible: bool
+    warnings: tuple[str, ...]
     random: bool
     seconds: float
     periods: int
@@ -113,7 +114,7 @@ class _Seen:
 def _one(flight: Flight) -> _One:
     random = flight.estimator.kind != "truth" or flight.wind.turbulence != "none"
     start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
-    return _One(feasibility_margin(flight) < 0, random, typical_wall_time(flight), flight.periods, start)
+    return _One(tuple(warnings(flight)), random, typical_wall_time(flight), flight.periods, start)
 
 
 def _try_start(matrix: Matrix, combination: Combination) -> None:

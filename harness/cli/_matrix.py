@@ -1,0 +1,146 @@
+"""A matrix of flights on the command line: what it holds, how long it takes, its flights flown, and their results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from harness.cli._progress import busy, duration, of_run
+
+if TYPE_CHECKING:
+    from harness.runs.matrix import Matrix
+    from harness.runs.run import Options, Progress
+    from harness.runs.survey import Survey
+
+_MOST_LINES = 60  # of the table of results
+_MOST_REASONS = 5
+_MOST_WARNINGS = 10
+
+
+def surveyed(matrix: Matrix, limit: int | None = None, done: frozenset[int] = frozenset()) -> Survey:
+    """Checks every flight of the matrix that is not done. Raises `SettingsError`."""
+    from rich.console import Console
+
+    from harness.runs.survey import survey
+
+    with Console(stderr=True).status("checking the matrix") as status:
+        for size in survey(matrix, limit, done):
+            status.update(f"checking the matrix: {size.flights} flights")
+    return size
+
+
+def print_survey(matrix: Matrix, size: Survey, done: int) -> None:
+    """The question, the number of flights and what varies; the warnings on standard error."""
+    for text in (matrix.experiment.title, matrix.experiment.question):
+        if text:
+            click.echo(text)
+    click.echo(counted(size.flights, "flight") + (f", {done} already done" if done else ""))
+    for key, count in size.varies.items():
+        click.echo(f"  {key}: {count} values")
+    for key in matrix.draws:
+        click.echo(f"  {key}: drawn from the seed")
+    of = f"{counted(size.flights - done, 'flight')} to fly" if done else counted(size.flights, "flight")
+    for warning, count in list(size.warnings.items())[:_MOST_WARNINGS]:
+        click.echo(f"warning: {count} of {of}: {warning}", err=True)
+    if (more := len(size.warnings) - _MOST_WARNINGS) > 0:
+        click.echo(f"warning: and {counted(more, 'more warning')}", err=True)
+    if size.idle_seeds and not done:
+        click.echo(
+            f"warning: the {size.idle_seeds} seeds repeat the same flight: the target is known exactly, the air has "
+            "no turbulence, and no setting is drawn from the seed",
+            err=True,
+        )
+
+
+def print_time(size: Survey, done: int, workers: int, log: str | None) -> None:
+    """How long the flights take, and how much of the disk."""
+    from harness.runs.run import RECORDED
+    from harness.runs.survey import disk
+
+    flights = size.flights - done
+    if not flights:
+        click.echo("all flights are done")
+        return
+    recorded = {"all": flights, "none": 0, "failed": 0}.get(log or "", min(RECORDED, flights))
+    room = _size(disk(size, recorded))
+    click.echo(f"about {duration(size.seconds / workers)} with {counted(workers, 'worker')}, {room} of disk")
+
+
+def fly_matrix(matrix: Matrix, out: Path, options: Options) -> Progress:
+    """Flies what is not done yet, shows how far it is, and prints the table of results.
+
+    Raises `StoreError` and `WorkersError`.
+    """
+    from harness.runs.results import export
+
+    progress = _fly(matrix, out, options)
+    with busy("writing the table of flights"):
+        export(out)
+    _print_results(matrix, out, progress)
+    return progress
+
+
+def _fly(matrix: Matrix, out: Path, options: Options) -> Progress:
+    import signal
+
+    from harness.runs.run import run
+
+    progress = None
+    states = of_run(run(matrix, out, options))
+    try:
+        while (state := next(states, None)) is not None:
+            progress = state
+    except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left to do takes no time
+        kept = progress.earlier + progress.done if progress else 0
+        click.echo(f"{counted(kept, 'flight')} are kept in {out}; the same command resumes the run", err=True)
+        raise
+    assert progress
+    return progress
+
+
+def _print_results(matrix: Matrix, out: Path, progress: Progress) -> None:
+    """A table by the axes: medians over what is drawn, outcomes; then the failures, and where the results are."""
+    from harness.metric import METRICS
+    from harness.plants.plant import Outcome
+    from harness.runs.summary import summary
+    from harness.tables import number, table
+
+    results = summary(matrix, out, _MOST_LINES)
+    metrics = [metric for metric in METRICS.values() if metric.in_short_tables]
+    axes = [", ".join(key.rpartition(".")[2] for key in keys.split(", ")) for keys in results.axes]
+    ended = any(set(line.outcomes) != {"completed"} for line in results.lines)
+    headings = [*axes, "settled", *(metric.column_heading for metric in metrics), *(["ended"] if ended else [])]
+    rows = []
+    for line in results.lines:
+        cells = [*line.labels, f"{line.settled} of {line.flights}"]
+        cells += [number(line.medians[metric.name], metric.scale) for metric in metrics]
+        if ended:
+            cells.append(", ".join(f"{count} {outcome}" for outcome, count in line.outcomes.items()))
+        rows.append(cells)
+    alignment = "l" * len(axes) + "r" * (1 + len(metrics)) + "l"
+    for text in table(headings, rows, alignment):
+        click.echo(text)
+    if results.more:
+        click.echo(
+            f"... and {counted(results.more, 'line')} more; all flights: harness.load_results({str(out)!r}) in Python"
+        )
+    for reason, count in sorted(progress.reasons.items(), key=lambda item: -item[1])[:_MOST_REASONS]:
+        click.echo(f"failed: {count} x {reason}")
+    for problem in progress.recordings[:_MOST_REASONS]:
+        click.echo(f"warning: {problem}", err=True)
+    failed = sum(count for line in results.lines for outcome, count in line.outcomes.items() if Outcome(outcome).failed)
+    if failed:
+        click.echo(f"{counted(failed, 'flight')} failed; --retry failed flies them again")
+    click.echo(f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}")
+
+
+def counted(number: int, noun: str) -> str:
+    """`1 flight`, `2 flights`."""
+    return f"{number} {noun}{'s' if number != 1 else ''}"
+
+
+def _size(size: float) -> str:
+    return f"{size / 1e6:.0f} MB" if size >= 1e6 else f"{max(1, round(size / 1e3))} kB"
