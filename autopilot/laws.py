@@ -1,7 +1,9 @@
 """The guidance laws by name, each with its named gain sets."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from difflib import get_close_matches
+from inspect import signature
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -28,17 +30,37 @@ LAWS: Mapping[str, LawKind] = MappingProxyType(
 
 
 def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
-    """A law by name with a named gain set, the law's default without one.
+    """A guidance law by name with a named gain set, the law's default without one; a frozen value.
 
-    `parameters` (SI, rad) override single gains. KeyError for an unknown law or gain set; FutureWarning for the former
-    name of a gain set.
+    `parameters` override single gains and what all laws have: `standoff` (m), `max_heading_rate` (rad/s, not degrees),
+    `direction`, `airspeed`, `command`. `harness list laws` shows all of them.
+
+    Raises ValueError for a law, a gain set or a parameter that there is not, with those that there are; FutureWarning
+    for the former name of a gain set.
+
+    >>> law("nftsm")
+    >>> law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
     """
+    if name not in LAWS:
+        raise ValueError(_unknown("law", name, LAWS))
     kind = LAWS[name]
     gains = kind.default if gains is None else gains
     if gains in kind.former_names:
         warnings.warn(renamed(gains, kind.former_names[gains]), FutureWarning, stacklevel=2)
         gains = kind.former_names[gains]
+    if gains not in kind.gain_sets:
+        raise ValueError(_unknown(f"gain set of {name}", gains, kind.gain_sets))
+    known = [parameter for parameter in signature(kind.value).parameters if parameter != "gains"]
+    for parameter in parameters:
+        if parameter not in known:
+            raise ValueError(_unknown(f"parameter of {name}", parameter, known))
     return kind.value(**{"gains": gains, **kind.gain_sets[gains], **parameters})
+
+
+def _unknown(what: str, name: str, known: Collection[str]) -> str:
+    near = get_close_matches(str(name), known, n=1)
+    hint = f" - did you mean {near[0]!r}?" if near else ""
+    return f"no {what} is called {name!r}: there is {', '.join(known)}{hint}"
 
 
 def renamed(former: str, today: str) -> str:

@@ -1,31 +1,119 @@
 """Flies a guidance law on a kinematic and on a 6-DOF aircraft, and measures whether coordinated flight holds.
 
-`load_flight(path)` reads a flight, `simulate(flight)` flies it, `read_flight(path)` reads a recording back;
-`load_results(dir)` reads the results of `harness run`.
+A flight is a frozen value: make one with `Flight` and `law`, or read one with `load_flight`; change a copy with
+`dataclasses.replace`. `simulate(flight)` flies it and gives a `FlightLog`, which has `.frame()`, `.metrics` and
+`.plot()`; `record` writes it for the Rerun viewer, `read_flight` reads it back.
+
+`run(path, out=...)` flies a matrix of flights, `load_results(dir)` reads its table, `compare(dir)` says how the flights
+differ that are alike but for the plant.
+
+Inside, everything is SI and radians; the world is north-east-down from the flight's origin, headings are clockwise from
+north, a wind is the velocity of the air (towards). Paths are `str` or `Path`. The harness's errors have the
+base `HarnessError`.
+
+>>> import math, dataclasses, harness
+>>> flight = harness.Flight(
+...     plant="sixdof",
+...     law=harness.law("nftsm", max_heading_rate=math.radians(10.0)),
+...     wind=harness.Wind(steady=(3.0, 0.0)),
+... )
+>>> log = harness.simulate(flight)
+>>> log.plot(harness.simulate(dataclasses.replace(flight, plant="kinematic")))
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from harness.loop import simulate
-    from harness.review.reading import read_recording as read_flight
+    from autopilot.estimator import Estimator
+    from autopilot.guidance import Guidance, Law, Observation
+    from autopilot.laws import law
+    from harness.comparison import Comparison, compare
+    from harness.error import HarnessError, SettingsError
+    from harness.flight import Flight, InnerLoop, MetricSettings
+    from harness.interface import metrics, read_flight, record, run, simulate
+    from harness.log import FlightLog
+    from harness.margins import Assess
+    from harness.plants.plant import Outcome, PlantError, Start
+    from harness.review.viewer import ViewerError
     from harness.runs.results import load_results
+    from harness.runs.store import StoreError
+    from harness.runs.workers import WorkersError
     from harness.settings import load_flight
+    from harness.verdict.pairs import CompareError
+    from harness.world.target import Segment, Target
+    from harness.world.track import TrackError
+    from harness.world.wind import Gust, Wind
 
-__all__ = ["load_flight", "load_results", "read_flight", "simulate"]
+__all__ = [
+    "Assess",
+    "CompareError",
+    "Comparison",
+    "Estimator",
+    "Flight",
+    "FlightLog",
+    "Guidance",
+    "Gust",
+    "HarnessError",
+    "InnerLoop",
+    "Law",
+    "MetricSettings",
+    "Observation",
+    "Outcome",
+    "PlantError",
+    "Segment",
+    "SettingsError",
+    "Start",
+    "StoreError",
+    "Target",
+    "TrackError",
+    "ViewerError",
+    "Wind",
+    "WorkersError",
+    "compare",
+    "law",
+    "load_flight",
+    "load_results",
+    "metrics",
+    "read_flight",
+    "record",
+    "run",
+    "simulate",
+]
 
-_HOME = {
-    "load_flight": ("harness.settings", "load_flight"),
-    "load_results": ("harness.runs.results", "load_results"),
-    "read_flight": ("harness.review.reading", "read_recording"),
-    "simulate": ("harness.loop", "simulate"),
+# Where each name lives. It is loaded when it is first asked for: `harness --help` needs none of them.
+_HOMES = {
+    "autopilot.estimator": ["Estimator"],
+    "autopilot.guidance": ["Guidance", "Law", "Observation"],
+    "autopilot.laws": ["law"],
+    "harness.comparison": ["Comparison", "compare"],
+    "harness.error": ["HarnessError", "SettingsError"],
+    "harness.flight": ["Flight", "InnerLoop", "MetricSettings"],
+    "harness.interface": ["metrics", "read_flight", "record", "run", "simulate"],
+    "harness.log": ["FlightLog"],
+    "harness.margins": ["Assess"],
+    "harness.plants.plant": ["Outcome", "PlantError", "Start"],
+    "harness.review.viewer": ["ViewerError"],
+    "harness.runs.results": ["load_results"],
+    "harness.runs.store": ["StoreError"],
+    "harness.runs.workers": ["WorkersError"],
+    "harness.settings": ["load_flight"],
+    "harness.verdict.pairs": ["CompareError"],
+    "harness.world.target": ["Segment", "Target"],
+    "harness.world.track": ["TrackError"],
+    "harness.world.wind": ["Gust", "Wind"],
 }
 
 
-def __getattr__(name: str) -> Any:
-    """Loads a public name when it is first asked for: `harness --help` needs none of them."""
-    if name not in _HOME:
+if not TYPE_CHECKING:  # to a type checker any name would be there
+
+    def __getattr__(name: str) -> Any:
+        for home, names in _HOMES.items():
+            if name in names:
+                value = globals()[name] = getattr(import_module(home), name)
+                return value
         raise AttributeError(f"module 'harness' has no attribute {name!r}")
-    module, attribute = _HOME[name]
-    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

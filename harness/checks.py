@@ -1,11 +1,11 @@
 """What is wrong with a flight beyond what each of its fields says of itself: rates, wind, target, airframe."""
 
 import math
-from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
 
 import aircraft
+from harness.error import did_you_mean
 from harness.flight import Flight, plant_of
 from harness.plants.plant import PlantError
 from harness.world.air import Air
@@ -80,10 +80,9 @@ def airframe_of(name: str) -> Path:
         if aircraft.is_folder(name):
             must = f"{name}: the folder must hold airframe.toml and a JSBSim model, {Path(name).name}.xml"
             raise ValueError(must) from None
-        near = get_close_matches(name, aircraft.names(), n=1)
-        hint = f" - did you mean {near[0]!r}?" if near else ""
-        allowed = ", ".join(aircraft.names())
-        raise ValueError(f"is {name[:60]!r}, must be one of {allowed}, or a folder{hint}") from None
+        known = aircraft.names()
+        allowed = f"must be one of {', '.join(known)}, or a folder"
+        raise ValueError(f"is {name[:60]!r}, {allowed}{did_you_mean(name, known)}") from None
     aircraft.limits(airframe)
     return airframe
 

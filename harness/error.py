@@ -1,6 +1,7 @@
-"""The errors that a user can make: all have one base, and each message says what is wrong and what is allowed."""
+"""The errors that users meet: all have one base, and each message says what is wrong and what is allowed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 
 
 class HarnessError(Exception):
@@ -13,3 +14,9 @@ class SettingsError(HarnessError, ValueError):
     def __init__(self, lines: Sequence[str]) -> None:
         super().__init__("\n".join(lines))
         self.lines = list(lines)
+
+
+def did_you_mean(word: object, known: Iterable[str]) -> str:
+    """The end of a message about an unknown word: the nearest of those known, or nothing."""
+    nearest = get_close_matches(str(word), list(known), n=1)
+    return f" - did you mean {nearest[0]!r}?" if nearest else ""

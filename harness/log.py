@@ -2,16 +2,22 @@
 
 import hashlib
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.estimator import Estimate, Measurement
 from autopilot.guidance import Guidance
+from harness.error import did_you_mean
 from harness.flight import Flight
 from harness.plants.plant import Outcome
 from harness.plants.state import State
 from harness.world.target import TargetState
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 # The loop writes the first columns, row by row; the rest follows from the flight as a whole.
 GUIDANCE_COLUMNS = ("heading_rate_command", "range_error_seen", *Guidance._fields[2:])  # from what the law knew
@@ -46,6 +52,9 @@ class FlightLog:
     table: NDArray[np.float64]  # (rows, len(COLUMNS))
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
+        """The column, (rows,). KeyError for a name that is none of `COLUMNS`."""
+        if column not in COLUMNS:
+            raise KeyError(f"no column {column!r}{did_you_mean(column, COLUMNS)}; the columns are {', '.join(COLUMNS)}")
         return self.table[:, COLUMNS.index(column)]
 
     def __len__(self) -> int:
@@ -59,3 +68,31 @@ class FlightLog:
             rows = self.table[begin : begin + _ROWS_AT_ONCE, _TRAJECTORY]
             content.update(np.ascontiguousarray(rows + 0.0).data)  # + 0.0: minus zero is zero
         return content.hexdigest()[:32]
+
+    # What a notebook asks of a log. Each loads what it needs when it is asked: a flight alone needs neither.
+
+    @property
+    def metrics(self) -> dict[str, float | bool | None]:
+        """All metrics by name, units by suffix; None where the plant has no such thing, or the flight shows none."""
+        from harness.metric import measure
+
+        return measure(self)
+
+    def frame(self) -> "pd.DataFrame":
+        """The log as a pandas DataFrame: a row per guidance period, a column per name of `COLUMNS`. SI, rad, NED."""
+        import pandas as pd
+
+        return pd.DataFrame(self.table, columns=COLUMNS, copy=True)
+
+    def plot(self, *others: "FlightLog") -> "Figure":
+        """A matplotlib figure of this flight, and of `others` over it, up to six in all.
+
+        The track with north up, the target and the standoff circle; over time the range error in m (linear within the
+        tolerance, logarithmic beyond), the heading rate in deg/s with its command, and bank and sideslip in deg where
+        the plant has them. A notebook shows the figure by itself.
+
+        >>> log.plot().savefig("flight.png")
+        """
+        from harness.figure import picture
+
+        return picture((self, *others))

@@ -72,12 +72,16 @@ class SettingsFile:
         return Place(line, f"{self.path}:{line}")
 
 
-def load_flight(path: Path, overrides: Sequence[str] = ()) -> Flight:
-    """The flight that a file describes. `overrides` are texts KEY=VALUE, keys dotted below [flight], in file units.
+def load_flight(path: str | Path, overrides: Sequence[str] = ()) -> Flight:
+    """The flight that a settings file (TOML) describes.
 
-    Raises `SettingsError` with every mistake.
+    `overrides` are texts KEY=VALUE, keys dotted below [flight], in the file's units: degrees, where a key ends so.
+
+    Raises `SettingsError` with every mistake, each with its line and what is allowed; also when it cannot be read.
+
+    >>> flight = load_flight("experiments/stationary.toml", ["plant=kinematic", "start.heading_deg=60"])
     """
-    return read_settings(path, overrides).flight()
+    return read_settings(Path(path), overrides).flight()
 
 
 def read_settings(path: Path, overrides: Sequence[str] = ()) -> SettingsFile:

@@ -3,13 +3,12 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic_core import ErrorDetails
 
-from harness.error import SettingsError
+from harness.error import SettingsError, did_you_mean
 from harness.settings.table import Setting, Table
 from harness.settings.toml_locator import Key, dotted
 
@@ -57,7 +56,7 @@ def mistake(table: Table, document: Any, details: ErrorDetails) -> Mistake:
             continue
         if step not in table.settings:
             known = sorted(table.settings)
-            return Mistake(key, f"unknown key, known here: {', '.join(known)}{_did_you_mean(step, known)}")
+            return Mistake(key, f"unknown key, known here: {', '.join(known)}{did_you_mean(step, known)}")
         setting = table.settings[step]
         table = setting.table or table
         if step not in value:
@@ -69,7 +68,7 @@ def mistake(table: Table, document: Any, details: ErrorDetails) -> Mistake:
         expected = expected.replace("number", "finite number")
     if details["type"] == "too_large":
         expected += f", of {LARGEST:g} at most in size"
-    return Mistake(key, f"is {_shown(value)}, must be {expected}{_did_you_mean(value, _choices(setting))}")
+    return Mistake(key, f"is {_shown(value)}, must be {expected}{did_you_mean(value, _choices(setting))}")
 
 
 def _expected(setting: Setting) -> str:
@@ -91,11 +90,6 @@ def _expected(setting: Setting) -> str:
 
 def _choices(setting: Setting) -> tuple[str, ...]:
     return get_args(setting.kind) if get_origin(setting.kind) is Literal else ()
-
-
-def _did_you_mean(word: object, known: Sequence[str]) -> str:
-    nearest = get_close_matches(str(word), known, n=1)
-    return f" - did you mean {nearest[0]!r}?" if nearest else ""
 
 
 def _shown(value: object) -> str:

@@ -1,0 +1,172 @@
+"""Flights that differ in one setting alone, compared: what a notebook asks of the results of a run."""
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from harness.error import did_you_mean
+from harness.margins import Assess
+from harness.metric import METRICS
+from harness.plants.ladder import BASELINE
+from harness.runs.results import load_results, mixed_versions
+from harness.runs.store import last_run
+from harness.settings import settings_from_text
+from harness.verdict import comparison as verdict
+from harness.verdict.pairs import CompareError, settings_of
+from harness.verdict.parts import PARTS, Part
+from harness.verdict.scorecard import IF
+from harness.verdict.words import answer
+
+_NEEDED = ("key", "outcome", "plant", "aircraft", "seed", "duration_s", "law.name", "law.standoff_m", *METRICS)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What flights say that differ in one setting alone."""
+
+    answer: str  # in words
+    differences: pd.DataFrame  # see `compare`
+    conditions: pd.DataFrame
+
+
+def compare(
+    results: str | Path | pd.DataFrame,
+    by: str = "plant",
+    baseline: object = None,
+    where: Mapping[str, object] | None = None,
+    *,
+    assess: Assess | None = None,
+) -> Comparison:
+    """Pairs the flights that differ in the setting `by` alone, and says how their metrics differ.
+
+    results: a directory of `run`, or a DataFrame as `load_results` gives it.
+    by: the setting, a column of the results; today the plant alone.
+    baseline: its value that the others are compared with; None is the kinematic plant.
+    where: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
+    assess: the margins of the verdict; None: those that the run's settings say, of a DataFrame the defaults.
+
+    The answer has
+    `answer`: text: does the assumption hold, what breaks first, what does it cost;
+    `differences`: one row per metric, value of `by`, aircraft and law: `metric` (unit by suffix), `value`, `aircraft`,
+        `law`, `pairs`, `seeds`, `difference` (mean of the pairs, other minus baseline), `low` and `high` (its 95 %
+        interval, by seeds; NaN without one), `verdict` (holds, fails or undecided where there is a margin; lower,
+        higher or undecided without);
+    `conditions`: `metric`, `value`, `aircraft`, `condition`: under what condition a part of the assumption holds that
+        does not hold throughout.
+
+    Raises `CompareError` with what is missing or unknown, and what there is; `StoreError` without results.
+
+    >>> comparison = harness.compare("out/wind", where={"aircraft": "aerosonde"})
+    >>> print(comparison.answer)
+    >>> comparison.differences.query("metric == 'range_error_rms_m'")
+    """
+    if isinstance(results, pd.DataFrame):
+        flights, margins = _checked(results), Assess()
+    else:
+        flights, margins = flights_and_margins(Path(results))
+    if by not in settings_of(flights):
+        raise CompareError(_unknown("by", by, settings_of(flights)))
+    if by != "plant":
+        raise CompareError(f"by is {by!r}, only 'plant' can be compared so far")
+    chosen = _chosen(flights, where or {})
+    compared = verdict.compare(chosen, assess or margins, BASELINE if baseline is None else str(baseline))
+    return Comparison("\n".join(answer(compared)), _differences(compared), _conditions(compared))
+
+
+def flights_and_margins(folder: Path, overrides: Sequence[str] = ()) -> tuple[pd.DataFrame, Assess]:
+    """The flights of a run, and the margins that its settings and command line say; `overrides`: assess.KEY=VALUE.
+
+    Raises `StoreError`, `SettingsError`; `CompareError` when the flights are of different versions.
+    """
+    of = last_run(folder)
+    where = Path(f"{folder} (its copy of {of['file']})")
+    assess = settings_from_text(of["settings"], where, [*_given(of["command"]), *overrides]).assess()
+    if mixed := mixed_versions(folder):
+        raise CompareError(
+            f"{folder}: its flights are of different versions, which a comparison must not mix: {'; '.join(mixed)}. "
+            "Fly them again into another directory"
+        )
+    return load_results(folder), assess
+
+
+def _given(command: str) -> Iterator[str]:
+    """The margins that a command line set."""
+    words = shlex.split(command)
+    for i, word in enumerate(words):
+        text = word.removeprefix("--set=") if word.startswith("--set=") else words[i + 1] if word == "--set" else ""
+        if text.strip().startswith("assess."):
+            yield text
+
+
+def _checked(results: pd.DataFrame) -> pd.DataFrame:
+    """The flights, each once, with rows that are numbered anew. CompareError when it is no table of results."""
+    missing = [name for name in _NEEDED if name not in results]
+    if missing:
+        raise CompareError(
+            f"the table has no column {', '.join(missing)}: it must be as harness.load_results gives it, "
+            f"and has {', '.join(map(str, results.columns)) or 'none'}"
+        )
+    return results.drop_duplicates("key").reset_index(drop=True)
+
+
+def _chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
+    for key, wanted in where.items():
+        if key not in settings_of(flights):
+            raise CompareError(_unknown("where", key, settings_of(flights)))
+        column = flights[key]
+        values = wanted if isinstance(wanted, list) else [wanted]
+        if column.map(lambda value: isinstance(value, tuple)).any() and not any(isinstance(v, tuple) for v in values):
+            values = [tuple(values)]  # a setting that is a list itself
+        there = list(dict.fromkeys(column))
+        for value in values:
+            if value not in there:
+                known = ", ".join(map(str, there[:20])) + (", ..." if len(there) > 20 else "")
+                hint = did_you_mean(value, map(str, there))
+                raise CompareError(f"where: no flight has {key} = {value!r}{hint}; there is {known}")
+        flights = flights[column.isin(values)]
+        if not len(flights):
+            raise CompareError(f"where: no flight is left that has {dict(where)}")
+    return flights.reset_index(drop=True)
+
+
+def _unknown(what: str, key: str, known: Sequence[str]) -> str:
+    return f"{what}: no setting is called {key!r}{did_you_mean(key, known)}; the settings are {', '.join(known)}"
+
+
+def _differences(compared: verdict.Comparison) -> pd.DataFrame:
+    parts = {part.column: part for part in PARTS if part.bounds(compared.assess) != (None, None)}
+    rows = []
+    for row in compared.rows:
+        mean, low, high, pairs, seeds, _ = row.difference
+        word = _word(row, parts.get(row.metric), compared.assess)
+        rows.append((row.metric, row.plant, row.aircraft, row.law, pairs, seeds, mean, low, high, word))
+    columns = ["metric", "value", "aircraft", "law", "pairs", "seeds", "difference", "low", "high", "verdict"]
+    return pd.DataFrame(rows, columns=columns).astype({"low": float, "high": float})
+
+
+def _word(row: verdict.Row, part: Part | None, assess: Assess) -> str:
+    """The verdict that the 95 % interval of a difference allows; undecided without an interval."""
+    low, high = row.difference.low, row.difference.high
+    if low is None or high is None:
+        return "undecided"
+    if part is None:
+        return "higher" if low > 0.0 else "lower" if high < 0.0 else "undecided"
+    scale = row.reference if part.relative else 1.0
+    least, most = (None if bound is None else bound * scale for bound in part.bounds(assess))
+    if (least is None or low >= least) and (most is None or high <= most):
+        return "holds"
+    outside = (least is not None and high < least) or (most is not None and low > most)
+    return "fails" if outside else "undecided"
+
+
+def _conditions(compared: verdict.Comparison) -> pd.DataFrame:
+    rows = [
+        (finding.part.column, card.plant, card.aircraft, finding.condition)
+        for card in compared.scorecards
+        for finding in card.findings
+        if finding.verdict == IF
+    ]
+    return pd.DataFrame(rows, columns=["metric", "value", "aircraft", "condition"])

@@ -1,0 +1,176 @@
+"""What a notebook calls, where that takes several rooms: fly, record, read back, run a matrix."""
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from autopilot.laws import LAWS, law
+from harness import loop
+from harness.error import SettingsError
+from harness.flight import Flight
+from harness.log import FlightLog
+from harness.settings import document, flight_from_document
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from harness.loop import Watch
+    from harness.runs.run import Progress
+
+_EVERY = 1.0  # s between two lines of progress
+
+
+def simulate(flight: Flight, watch: "Watch | None" = None) -> FlightLog:
+    """Flies the flight and returns its log: how it ended, and one row per guidance period.
+
+    A flight that ends early (it hits the ground, loses the target, a law raises) is a result: see `log.outcome` and
+    `log.reason`. The same flight gives the same bits each time.
+
+    `watch(time, so_far)` is called after each row with the time in s and a function that returns the log so far.
+
+    Raises `SettingsError` when the flight cannot be flown as it is set, with one line for each mistake in the keys and
+    units of a settings file; `PlantError` when the aircraft cannot start so.
+
+    >>> flight = harness.Flight(plant="sixdof", law=harness.law("nftsm", "paper_1"))
+    >>> log = harness.simulate(flight)
+    >>> log.outcome, log.metrics["convergence_time_s"]
+    """
+    _check(flight)
+    return loop.simulate(flight, watch)
+
+
+def metrics(log: FlightLog) -> dict[str, float | bool | None]:
+    """The numbers that a flight is judged by, each by its name with the unit as suffix; `log.metrics` is the same.
+
+    A metric is None where the plant has no such thing (a kinematic aircraft has no bank), or the flight does not show
+    it (it never converged). `harness list metrics` says what each means.
+
+    >>> harness.metrics(log)["range_error_rms_m"]
+    """
+    return log.metrics
+
+
+def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title: str = "", notes: str = "") -> Path:
+    """Writes one flight, or several by name, into a Rerun recording (`.rrd`) and returns its path.
+
+    Of several the first is the reference, drawn wide and pale under the others. `notes` is Markdown, shown above the
+    results. `harness view PATH` shows it, `read_flight(PATH)` reads it back.
+
+    Raises OSError when it cannot be written, ValueError for more flights than can be told apart.
+
+    >>> harness.record(log, "flight.rrd")
+    >>> harness.record({"kinematic": kinematic, "sixdof": sixdof}, "pair.rrd", title="The same flight twice")
+    """
+    from harness.review.recording import write_recording
+
+    path = Path(path)
+    logs = {log.flight.plant: log} if isinstance(log, FlightLog) else log
+    write_recording(path, logs, title or path.stem, notes)
+    return path
+
+
+def read_flight(path: str | Path, flight: str | None = None) -> "pd.DataFrame":
+    """The log of a recorded flight, bit for bit as `FlightLog.frame()` gave it: one row per guidance period.
+
+    `flight` names it where the file holds several. Columns as in `FlightLog`: SI, rad, north-east-down.
+
+    Raises OSError when the file cannot be read, ValueError when there is no such flight in it; the message names those
+    that there are.
+
+    >>> harness.read_flight("pair.rrd", "sixdof")["range_error"].iloc[-1]
+    """
+    from harness.review.reading import read_recording
+
+    return read_recording(Path(path), flight)
+
+
+def run(
+    path: str | Path,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    limit: int | None = None,
+    log: str | None = None,
+    overrides: Sequence[str] = (),
+    retry_failed: bool = False,
+    timeout: float | None = None,
+    progress: bool = False,
+) -> "pd.DataFrame":
+    """Flies the matrix of a settings file into a directory, and returns its results as `load_results` does.
+
+    What was flown before is not flown again, so the same call goes on where it was interrupted: finished flights are
+    kept, whatever ends it.
+
+    out: the directory of the results, made where there is none.
+    workers: processes; None is one per processor, 0 flies in this process. A script that uses workers must call this
+        under `if __name__ == "__main__":`, as Python's multiprocessing asks; a notebook need not.
+    limit: only the first so many flights of the matrix.
+    log: which flights are recorded in OUT/flights: "all", "sample", "failed" or "none"; None is all up to 50, else a
+        sample.
+    overrides: texts KEY=VALUE that set a key for all flights, as `--set` of the command line does.
+    retry_failed: fly those again that failed.
+    timeout: s of wall time for one flight; None is 20 times its estimate.
+    progress: print how far it is to standard error, once a second.
+
+    Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
+    used; `WorkersError` when the processes cannot fly. A flight that fails is a row, not an error.
+
+    >>> results = harness.run("experiments/gains.toml", out="out/gains", progress=True)
+    >>> results.groupby("plant")["convergence_time_s"].median()
+    """
+    from harness.runs.matrix import read_matrix
+    from harness.runs.results import export, load_results
+    from harness.runs.run import LOGS, Options, positions_done
+    from harness.runs.run import run as fly
+    from harness.runs.survey import survey
+    from harness.settings import read_settings
+
+    if log is not None and log not in LOGS:
+        raise ValueError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
+    path, out = Path(path), Path(out)
+    workers = (os.cpu_count() or 1) if workers is None else workers
+    matrix = read_matrix(read_settings(path, overrides))
+    for _ in survey(matrix, limit, positions_done(matrix, out, retry_failed=retry_failed)):
+        pass  # every mistake is found before the first flight
+    options = Options(workers=workers, limit=limit, log=log, retry_failed=retry_failed, timeout=timeout)
+    states = fly(matrix, out, options)
+    for _ in _printed(states) if progress else states:
+        pass
+    export(out)
+    return load_results(out)
+
+
+def _printed(states: "Iterator[Progress]") -> "Iterator[Progress]":
+    """The same, with a line on standard error once a second and at the end."""
+    due = time.monotonic()
+    state = None
+    for state in states:
+        if time.monotonic() >= due:
+            due = time.monotonic() + _EVERY
+            print(_line(state), end="\r", file=sys.stderr, flush=True)
+        yield state
+    if state is not None:
+        print(_line(state), file=sys.stderr)
+
+
+def _line(state: "Progress") -> str:
+    done = state.earlier + state.done
+    return f"{done} of {state.total} flights done, {state.failed} failed, {state.seconds:.0f} s"
+
+
+def _check(flight: Flight) -> None:
+    """Every field by its declaration, as a file's values are checked. Raises `SettingsError`."""
+    if not isinstance(flight, Flight):
+        raise SettingsError([f"flight: is {flight!r}, must be a harness.Flight"])
+    if not callable(getattr(flight.law, "start", None)):
+        raise SettingsError([f"flight.law: is {flight.law!r}, must be a law, as harness.law('nftsm') is"])
+    for part in fields(Flight):
+        value, kind = getattr(flight, part.name), part.default_factory
+        if isinstance(kind, type) and is_dataclass(kind) and not isinstance(value, kind):
+            raise SettingsError([f"flight.{part.name}: is {value!r}, must be a harness.{kind.__name__}"])
+    is_own = type(flight.law) not in [kind.value for kind in LAWS.values()]
+    flight_from_document(document(replace(flight, law=law("nftsm")) if is_own else flight))
