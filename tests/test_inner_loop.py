@@ -8,9 +8,10 @@ import pytest
 
 import aircraft
 from harness.plants.plant import Start
-from harness.plants.sixdof import SixDof
+from harness.plants.sixdof import SixDof, load, trim
 from harness.plants.state import State
 from harness.world.air import Air
+from harness.world.wind import Wind
 
 AIRFRAMES = aircraft.names()
 STEP = 0.005
@@ -64,11 +65,53 @@ def test_without_the_rate_trim_the_rudderless_wing_falls_7_to_8_percent_short() 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -4.0)])
 @pytest.mark.parametrize("name", AIRFRAMES)
-def test_engagement_leaves_no_transient(name: str, wind: tuple[float, float]) -> None:
+def test_without_a_command_nothing_moves_after_trim(name: str, wind: tuple[float, float]) -> None:
+    """To rounding in still air. The trim knows of no drift over the sphere: 5 m/s turn the level by 1e-6 rad/s."""
+    still, drift = wind == (0.0, 0.0), 1e-5
     x = flown(name, 0.0, 60.0, wind)
-    assert departure(x["airspeed"]) <= 1e-3
-    assert departure(x["altitude"]) <= 1e-3
-    assert departure(x["heading"]) <= 1e-4
+    for field in ("bank", "pitch", "sideslip", "angle_of_attack", "aileron", "elevator", "throttle", "heading"):
+        assert departure(x[field]) <= (1e-8 if still else drift), field
+    assert departure(x["airspeed"]) <= (1e-8 if still else drift)
+    assert departure(x["altitude"]) <= (1e-7 if still else drift)
+
+
+@pytest.mark.parametrize("name", AIRFRAMES)
+def test_a_flight_begins_in_trim_and_its_clock_at_nought(name: str) -> None:
+    airframe = aircraft.folder(name)
+    start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=0.4)
+    trimmed = trim(load(airframe, STEP), start, Air())
+    x = flown(name, FIVE, 1.0)
+    for field, value in (*trimmed._asdict().items(), ("aileron", 0.0), ("bank", 0.0), ("heading", 0.4)):
+        assert x[field][0] == pytest.approx(value, abs=1e-10), field
+    for axis, speed in (("north", math.cos(0.4)), ("east", math.sin(0.4))):  # a step on, it has flown one step's way
+        assert x[axis][1] - x[axis][0] == pytest.approx(STEP * start.airspeed * speed, abs=1e-6)
+
+
+@pytest.mark.parametrize("air", ["still air", "moderate turbulence"])
+@pytest.mark.parametrize("rate", [5.0, -20.0])
+@pytest.mark.parametrize("name", AIRFRAMES)
+def test_no_surface_moves_faster_than_its_servo_can(name: str, rate: float, air: str) -> None:
+    """From the first step on: a reversed command, every surface in every step; elevons one by one."""
+    airframe = aircraft.folder(name)
+    start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=0.4)
+    rough = Wind(steady=(2.0, 1.0), turbulence="moderate").start(
+        airspeed=start.airspeed, altitude=start.altitude, step=STEP, duration=6.0, seed=3
+    )
+    flying = SixDof(airframe, STEP, True).start(start, Air() if air == "still air" else rough)
+    states = [flying.state]
+    for k in range(1200):
+        flying.advance(math.radians(rate if k < 600 else -rate), STEP)
+        states.append(flying.state)
+    aileron, elevator, rudder = np.array([(s.aileron, s.elevator, s.rudder) for s in states]).T
+    servos = aircraft.data(airframe)["actuators"]
+    moved = {"aileron": aileron, "elevator": elevator, "rudder": rudder}
+    if servos["elevator"]["order"]["v"] == 2.0:  # elevons; the limit is each one's
+        moved = {"elevator": elevator + aileron, "aileron": elevator - aileron}
+    fastest = {surface: float(np.abs(np.diff(angle)).max()) / STEP for surface, angle in moved.items()}
+    for surface, speed in fastest.items():
+        assert speed <= servos[surface]["rate_limit"]["v"] * (1.0 + 1e-9), surface
+    if rate == -20.0:  # so quick a command takes the servo to its limit: the test would see a faster one
+        assert fastest["aileron"] == pytest.approx(servos["aileron"]["rate_limit"]["v"])
 
 
 @pytest.mark.parametrize("name", AIRFRAMES)

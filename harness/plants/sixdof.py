@@ -185,8 +185,7 @@ def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: tuple[float, float]) -> No
     write(fdm, "ic/vd-fps", 0.0)
     ahead = start.airspeed + W_x * math.cos(start.heading) + W_y * math.sin(start.heading)
     write(fdm, "ic/q-rad_sec", -ahead / RADIUS)  # level on a sphere is turning down with it
-    write(fdm, "actuators/engaged", 0.0)
-    write(fdm, "inner-loop/engaged", 0.0)
+    _connect(fdm, False)
 
 
 def _accelerations(fdm: jsbsim.FGFDMExec, x: Trim) -> Vector:
@@ -203,17 +202,27 @@ def _accelerations(fdm: jsbsim.FGFDMExec, x: Trim) -> Vector:
 
 
 def engage(fdm: jsbsim.FGFDMExec, trimmed: Trim, start: Start, rate_trim: bool) -> None:
-    """Hands the trimmed aircraft to its inner loop, which holds this altitude and airspeed."""
+    """Hands the trimmed aircraft to its inner loop, which holds this altitude and airspeed.
+
+    A JSBSim actuator or filter without a past takes its first input at once, past its lag and rate limit. So each runs
+    a first time here, in trim and with time at rest: what it takes is the trim.
+    """
     write(fdm, "inner-loop/trim/pitch-rad", trimmed.pitch)
-    damping = fdm["inner-loop/gain/pitch-rate"] * fdm["velocities/q-rad_sec"]  # of the turn down with the sphere
-    write(fdm, "inner-loop/trim/elevator-rad", trimmed.elevator - damping)
+    write(fdm, "inner-loop/trim/pitch-rate-rad_s", fdm["velocities/q-rad_sec"])  # level on a sphere turns down with it
+    write(fdm, "inner-loop/trim/elevator-rad", trimmed.elevator)
     write(fdm, "inner-loop/trim/throttle-norm", trimmed.throttle)
     write(fdm, "inner-loop/command/altitude-m", start.altitude)
     write(fdm, "inner-loop/command/airspeed-mps", start.airspeed)
     write(fdm, "inner-loop/command/heading-rate-rad_s", 0.0)
     write(fdm, "inner-loop/rate-trim", float(rate_trim))
-    write(fdm, "inner-loop/engaged", 1.0)
-    write(fdm, "actuators/engaged", 1.0)
+    _connect(fdm, True)
+    fdm.run_ic()
+
+
+def _connect(fdm: jsbsim.FGFDMExec, connected: bool) -> None:
+    """Whether the inner loop and the actuators run."""
+    write(fdm, "inner-loop/engaged", float(connected))
+    write(fdm, "actuators/engaged", float(connected))
 
 
 _READ = (
@@ -263,11 +272,13 @@ class SixDof:
         except NoTrimError as error:
             allowed = f"{self.airframe.name} flies from {limits.slowest:g} to {limits.fastest:g} m/s"
             raise PlantError("start.airspeed", f"{error}; {allowed}") from None
-        blow = _blower(fdm, air) if len(air.gusts) else None
-        if blow:
-            blow()
-            fdm.run_ic()
         engage(fdm, trimmed, start, self.rate_trim)
+        blow = _blower(fdm, air) if len(air.gusts) else None
+        if blow:  # the first gust is there before the surfaces answer it
+            blow()
+            _connect(fdm, False)
+            fdm.run_ic()
+            _connect(fdm, True)
         return _SixDofFlying(fdm, self.step, start, air, limits.stall, blow)
 
 
