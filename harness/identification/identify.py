@@ -24,7 +24,7 @@ from harness.identification.manoeuvres import (
     held,
     sweep,
 )
-from harness.plants.coordinated import bank_of
+from harness.plants.coordinated import bank_command
 from harness.plants.identified import Identified
 from harness.plants.plant import Plant, Start
 from harness.plants.state import State
@@ -130,7 +130,7 @@ def of_heading_rate(record: Record) -> Fitted:
 
 def of_bank(record: Record, limit: float) -> Fitted:
     """Bank from its command, as the inner loop makes it of the heading rate's."""
-    commanded = np.array([bank_of(rate, record.airspeed, limit) for rate in record.command.tolist()])
+    commanded = np.array([bank_command(rate, record.airspeed, limit) for rate in record.command.tolist()])
     bank = record.states[:, _BANK]
     return Fitted(commanded, 0.5 * (bank[1:] + bank[:-1]))
 

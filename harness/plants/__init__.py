@@ -1,1 +1,1 @@
-"""The plants, a rung of the ladder each."""
+"""The plants: models of the aircraft and its inner loop, from the paper's Eq. (1) to six degrees of freedom."""

@@ -1,4 +1,4 @@
-"""The second rung: bank and airspeed have dynamics and limits of their own, and the turn is coordinated."""
+"""The plant `coordinated`: bank and airspeed have dynamics and limits of their own; every turn is coordinated."""
 
 import math
 from dataclasses import dataclass
@@ -24,9 +24,10 @@ _TO_NODES = tuple(tuple(float(weight) for weight in row) for row in _WEIGHTS_TO_
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AirspeedHold:
-    """What a turn does to the airspeed, and the hold undoes: gain s e / (s^2 + 2 damping frequency s + frequency^2).
+    """The change of airspeed, m/s, that a turn causes: gain s e / (s^2 + 2 damping frequency s + frequency^2).
 
-    e = 1/cos(bank) - 1 is the load factor beyond one: the drag of the turn, less what the hold adds in advance.
+    The input e = 1/cos(bank) - 1 is the load factor beyond one. The gain stands for the drag that a turn adds, minus
+    the thrust that the airspeed hold adds in advance; the hold then brings the airspeed back.
     """
 
     gain: Annotated[float, About("m/s^2 per unit of load factor beyond one")]
@@ -36,10 +37,11 @@ class AirspeedHold:
 
 @dataclass(frozen=True, slots=True)
 class Coordinated:
-    """Level, without sideslip: heading rate = g tan(bank) / V.
+    """Level flight without sideslip: heading rate = g tan(bank) / V.
 
-    The bank is commanded, and limited, as the airframe's inner loop does it without its rate trim: a coordinated turn
-    has no shortfall for that to remove. The bank is exact between commands; what follows from it is collocation.
+    The inner loop's bank command and bank limit apply, without its rate trim: a coordinated turn has no shortfall of
+    turn rate to remove. Between commands the bank is exact; airspeed, heading and position follow from the bank by
+    collocation at Gauss's nodes.
     """
 
     bank: Response
@@ -54,13 +56,13 @@ class _CoordinatedFlying:
     def __init__(self, plant: Coordinated, start: Start, air: Air) -> None:
         self._propagator, self._level = Propagator(plant.bank, _NODES), Level(start, air)
         self._hold, self._limit, self._nominal = plant.airspeed, plant.bank_limit, start.airspeed
-        self._change = self._summed = 0.0  # of the airspeed, m/s, and its integral, m
+        self._change = self._summed = 0.0  # the change of airspeed, m/s, and its integral, m
         self.state = self._level.state(*start.position, start.airspeed, wrap(start.heading), 0.0, 0.0, 0.0, 0.0)
 
     def advance(self, heading_rate: float, period: float) -> None:
         propagator = self._propagator
         x, y, psi = self.state.north, self.state.east, self.state.heading
-        command = bank_of(heading_rate, self._nominal, self._limit)
+        command = bank_command(heading_rate, self._nominal, self._limit)
         for now, piece in propagator.pieces(command, period):
             h = piece.length
             tangents = [math.tan(dot(row, now)) for row in piece.outputs]
@@ -79,16 +81,16 @@ class _CoordinatedFlying:
         self.state = self._level.state(x + north, y + east, V, wrap(psi), rate, bank, propagator.slope, command)
 
 
-def bank_of(heading_rate: float, airspeed: float, limit: float) -> float:
-    """The bank of a coordinated turn, tan(bank) = V rate / g, within +-limit. rad."""
+def bank_command(heading_rate: float, airspeed: float, limit: float) -> float:
+    """The bank, rad, that the inner loop commands for a heading rate: tan(bank) = V rate / g, within +-`limit`."""
     return max(-limit, min(limit, bank_of_turn(airspeed, heading_rate)))
 
 
 @lru_cache(maxsize=64)
 def _airspeed_rows(hold: AirspeedHold, h: float) -> tuple[tuple[float, ...], ...]:
-    """Over h seconds: change of airspeed at the nodes and the end, and its integral, from (both now, e at the nodes).
+    """One collocation step of h seconds of v' = -2 d w v - w^2 i + gain e, i' = v, as rows of a matrix.
 
-    The equations v' = -2 d w v - w^2 i + gain e, i' = v collocated at Gauss's nodes.
+    Each row multiplies (v now, i now, e at each node). The rows give v at each node, v at the end and i at the end.
     """
     F = np.array([[-2.0 * hold.damping * hold.frequency, -(hold.frequency**2)], [1.0, 0.0]])
     now = np.hstack([np.tile(np.eye(2), (_NODES, 1)), np.zeros((2 * _NODES, _NODES))])

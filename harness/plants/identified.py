@@ -1,4 +1,4 @@
-"""What an airframe was identified as: the file beside it that the plants `lagged` and `coordinated` fly by."""
+"""The identified inner loop of an airframe: the file `identified.toml`, for the plants `lagged` and `coordinated`."""
 
 import hashlib
 import tomllib
@@ -15,11 +15,11 @@ from harness.plants.lagged import Lagged
 from harness.plants.plant import PlantError
 from harness.plants.response import Response
 
-_NEAR = 0.05  # of the airspeed: farther from it the response is another
+_NEAR = 0.05  # relative: an identification holds for airspeeds this close to its own
 
 
 class IdentifiedError(PlantError):
-    """There is no identification for this airframe at this airspeed; the text says what to do."""
+    """The airframe is not identified at this airspeed, or its file is damaged; the message names the command to run."""
 
     def __init__(self, message: str) -> None:
         super().__init__("start.airspeed", message)
@@ -27,15 +27,15 @@ class IdentifiedError(PlantError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identified:
-    """An airframe with its inner loop at one airspeed, as linear responses. SI, rad."""
+    """Linear responses of an airframe under its inner loop at one airspeed. SI, rad."""
 
     airspeed: float
     heading_rate: Response  # from its command, with the rate trim
     bank: Response  # from its command, without the rate trim
     hold: AirspeedHold
     bank_limit: float  # of the inner loop's command
-    measured: Mapping[str, float]  # of the flown step and sweep
-    errors: Mapping[str, tuple[float, float]]  # of lagged and coordinated in each held-out manoeuvre, RMS / command's
+    measured: Mapping[str, float]  # figures of the flown step and sweep, by name
+    errors: Mapping[str, tuple[float, float]]  # by validation manoeuvre: (lagged, coordinated), RMS over the command's
 
     @property
     def lagged(self) -> Lagged:
@@ -47,65 +47,66 @@ class Identified:
 
 
 def identified(airframe: Path, airspeed: float) -> Identified:
-    """The identification nearest to this airspeed. Raises `IdentifiedError` without one within 5 %."""
+    """The identification nearest to this airspeed, m/s. Raises `IdentifiedError` when none is within 5 %."""
     known = read(airframe)
-    near = min(known, key=lambda one: abs(one.airspeed - airspeed), default=None)
+    near = min(known, key=lambda entry: abs(entry.airspeed - airspeed), default=None)
     if near is None or abs(near.airspeed - airspeed) > _NEAR * near.airspeed:
-        speeds = ", ".join(f"{one.airspeed:g}" for one in known)
+        speeds = ", ".join(f"{entry.airspeed:g}" for entry in known)
         at = f"identified at {speeds} m/s" if known else "not identified"
         raise IdentifiedError(
             f"{airframe.name} is {at}, the flight is at {airspeed:g} m/s: "
-            f"run harness identify {called(airframe)} --airspeed {airspeed:g}"
+            f"run harness identify {airframe_argument(airframe)} --airspeed {airspeed:g}"
         )
     return near
 
 
 def read(airframe: Path) -> list[Identified]:
-    """All identifications of an airframe, by airspeed; none without the file. `IdentifiedError` for a damaged file."""
+    """All identifications of an airframe, by airspeed; none without a file. `IdentifiedError` if it is damaged."""
     file = aircraft.identified(airframe)
     if not file.is_file():
         return []
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))["at"]
-        return sorted((_from(table) for table in tables), key=lambda one: one.airspeed)
+        return sorted((_from(table) for table in tables), key=lambda entry: entry.airspeed)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
-        again = f"run harness identify {called(airframe)}"
+        again = f"run harness identify {airframe_argument(airframe)}"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
 
 
 def is_stale(airframe: Path) -> bool:
-    """Whether the model or its inner loop has changed since it was identified."""
+    """Whether the airframe's model or its inner loop has changed since it was identified. OSError without the file."""
     text = aircraft.identified(airframe).read_text(encoding="utf-8")
     return tomllib.loads(text).get("model") != model_digest(airframe)
 
 
 def model_digest(airframe: Path) -> str:
-    """A hash of the airframe's model and of the inner loop."""
+    """A hash, 32 hex digits, of the airframe's JSBSim model and of the inner loop."""
     inner_loop = Path(autopilot.__file__).parent / "inner_loop.xml"
     content = aircraft.model(airframe).read_bytes() + inner_loop.read_bytes()
     return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
 def document(airframe: Path, known: list[Identified]) -> str:
-    """The file's text."""
+    """The text of `identified.toml` with these identifications."""
+    command = f"harness identify {airframe_argument(airframe)}"
     lines = [
-        f"# Written by `harness identify {called(airframe)}`: what the plants lagged and coordinated fly by. SI, rad.",
+        f"# Written by `{command}`: what the plants lagged and coordinated fly by. SI, rad.",
         "",
         f'model = "{model_digest(airframe)}" # of the model and inner loop that were flown',
     ]
-    for one in sorted(known, key=lambda one: one.airspeed):
-        lines += ["", "[[at]]", f"airspeed = {one.airspeed:g}", f"bank_limit = {one.bank_limit:g}"]
+    for entry in sorted(known, key=lambda entry: entry.airspeed):
+        lines += ["", "[[at]]", f"airspeed = {entry.airspeed:g}", f"bank_limit = {entry.bank_limit:g}"]
         for title, values, about in (
-            ("heading_rate", asdict(one.heading_rate), "from its command, the rate trim on: lagged"),
-            ("bank", asdict(one.bank), "from its command, the rate trim off: coordinated"),
-            ("hold", asdict(one.hold), "what the load factor beyond one does to the airspeed: coordinated"),
-            ("measured", one.measured, "flown on sixdof"),
+            ("heading_rate", asdict(entry.heading_rate), "from its command, the rate trim on: lagged"),
+            ("bank", asdict(entry.bank), "from its command, the rate trim off: coordinated"),
+            ("hold", asdict(entry.hold), "what the load factor beyond one does to the airspeed: coordinated"),
+            ("measured", entry.measured, "flown on sixdof"),
         ):
             lines += [f"[at.{title}] # {about}", *(f"{name} = {value:.5g}" for name, value in values.items())]
         lines.append(
             "[at.errors] # of the heading rate, RMS over the command's, [lagged, coordinated]; not used in the fit"
         )
-        lines += [f'"{name}" = [{a:.4f}, {b:.4f}]' for name, (a, b) in one.errors.items()]
+        lines += [f'"{name}" = [{a:.4f}, {b:.4f}]' for name, (a, b) in entry.errors.items()]
     return "\n".join(lines) + "\n"
 
 
@@ -125,6 +126,6 @@ def _numbers(table: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, value in table.items()}
 
 
-def called(airframe: Path) -> str:
-    """What the user calls the airframe: its name, or its folder."""
+def airframe_argument(airframe: Path) -> str:
+    """What a user types for the airframe: the name of one that is shipped, otherwise its folder."""
     return airframe.name if airframe.parent == aircraft.FOLDER else str(airframe)

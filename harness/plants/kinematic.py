@@ -1,4 +1,4 @@
-"""The paper's plant, Eq. (1): constant airspeed, level, the commanded heading rate followed at once."""
+"""The plant `kinematic`, the paper's Eq. (1): level, constant airspeed, the commanded heading rate at once."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from harness.world.air import Air
 
 @dataclass(frozen=True, slots=True)
 class Kinematic:
-    """Eq. (1). Between commands the motion is exact: a circular arc in the air, which carries it."""
+    """Eq. (1). Between commands the motion is exact: a circular arc relative to the air, plus the motion of the air."""
 
     def start(self, start: Start, air: Air) -> Flying:
         return _KinematicFlying(start, air)

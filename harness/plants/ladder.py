@@ -1,6 +1,6 @@
-"""The plants, each adding one thing to the one before it: the ladder from Eq. (1) to six degrees of freedom.
+"""The ladder of plants: each adds one thing to the one before it, from Eq. (1) to six degrees of freedom.
 
-A plant is one file beside this one, and one entry here. Nothing else asks for its name.
+A plant is one file beside this one and one entry of `PLANTS`; no other code asks for a plant by name.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,13 +23,13 @@ class Setup(NamedTuple):
     airframe: Path  # the airframe's folder
     airspeed: float  # nominal, m/s
     step: float  # of the 6-DOF simulation, s
-    rate_trim: bool  # of the inner loop
+    rate_trim: bool  # whether the inner loop removes the shortfall of the turn rate
 
 
 class Cost(NamedTuple):
-    """Processor time, s, that a flight takes beyond the guidance loop, on the machine of `make bench`."""
+    """Processor time, s, of a plant, without the guidance loop, on the machine of `make bench`."""
 
-    start: float = 0.0  # once
+    start: float = 0.0  # once per flight
     period: float = 0.0  # per guidance period, or per 50 ms of a longer one
     step: float = 0.0  # per simulation step
 
@@ -44,20 +44,20 @@ def _no_files(airframe: Path) -> Mapping[str, Path]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantKind:
-    """A plant as it is declared. Its place in `PLANTS` is its rung."""
+    """The declaration of a plant. Its place in `PLANTS` is its rung on the ladder."""
 
     about: str  # one sentence
-    adds: str  # what it adds to the rung below, in a few words
+    adds: str  # what it adds to the rung below, as a noun phrase
     make: Callable[[Setup], Plant]  # raises `PlantError`
-    banks: bool = False  # it turns by banking, so it has a bank limit and an airspeed envelope
-    files: Callable[[Path], Mapping[str, Path]] = _no_files  # of an airframe: what decides its flights, by name
-    libraries: tuple[str, ...] = ()  # distributions that decide its flights
+    banks: bool = False  # whether it turns by banking, within the airframe's bank limit and airspeed envelope
+    files: Callable[[Path], Mapping[str, Path]] = _no_files  # the files of an airframe that decide its flights, by name
+    libraries: tuple[str, ...] = ()  # the distributions whose version decides its flights
     cost: Cost = Cost()
-    warnings: Callable[[Setup], list[str]] = _nothing  # what a user should know before trusting a flight
+    warnings: Callable[[Setup], list[str]] = _nothing  # sentences that a user should know first
 
     @property
     def has_airframe(self) -> bool:
-        """Whether the airframe decides how it flies."""
+        """Whether an airframe decides its flights: `kinematic` has none."""
         return self.files is not _no_files
 
 
@@ -66,7 +66,7 @@ def _kinematic(setup: Setup) -> Plant:
 
 
 def _lagged(setup: Setup) -> Plant:
-    from harness.plants.identified import identified  # SciPy is loaded by those who fly by it
+    from harness.plants.identified import identified  # late: only the identified plants need SciPy
 
     return identified(setup.airframe, setup.airspeed).lagged
 
@@ -78,7 +78,7 @@ def _coordinated(setup: Setup) -> Plant:
 
 
 def _sixdof(setup: Setup) -> Plant:
-    from harness.plants.sixdof import SixDof  # JSBSim is loaded by those who fly it
+    from harness.plants.sixdof import SixDof  # late: only this plant needs JSBSim
 
     return SixDof(setup.airframe, setup.step, setup.rate_trim)
 
@@ -102,14 +102,14 @@ def _sixdof_files(airframe: Path) -> Mapping[str, Path]:
 
 
 def _identification_warnings(setup: Setup) -> list[str]:
-    from harness.plants.identified import called, is_stale
+    from harness.plants.identified import airframe_argument, is_stale
 
     warnings = []
     if is_stale(setup.airframe):
-        again = f"run harness identify {called(setup.airframe)}"
+        again = f"run harness identify {airframe_argument(setup.airframe)}"
         warnings.append(f"{setup.airframe.name} has changed since it was identified: {again}")
     if not setup.rate_trim:
-        warnings.append("rate_trim = false changes the 6-DOF plant only: this plant has no shortfall to leave")
+        warnings.append("rate_trim = false changes the plant sixdof only: this plant has no shortfall of turn rate")
     return warnings
 
 
@@ -152,5 +152,5 @@ BASELINE = next(iter(PLANTS))  # the lowest rung: what the paper assumes
 
 
 def rung(plant: str) -> int:
-    """How far up the ladder, from 0; -1 for a plant that is none of its rungs."""
+    """The place of a plant on the ladder, 0 at the bottom; -1 for an unknown plant."""
     return list(PLANTS).index(plant) if plant in PLANTS else -1

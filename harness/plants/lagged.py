@@ -1,4 +1,4 @@
-"""The first rung above Eq. (1): the heading rate follows its command as behind the airframe's inner loop, gain one."""
+"""The plant `lagged`: the heading rate follows its command with the identified response of the inner loop, gain one."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ _WEIGHTS = tuple(float(weight) for weight in gauss(_NODES)[1])
 
 @dataclass(frozen=True, slots=True)
 class Lagged:
-    """Level at constant airspeed. The heading is exact, the position its quadrature (1e-8 m off after 400 m)."""
+    """Level flight at constant airspeed. The heading is exact, the position a quadrature (1e-8 m off in 400 m)."""
 
     response: Response
 

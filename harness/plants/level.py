@@ -1,4 +1,4 @@
-"""Level flight in moving air: what the plants without an airframe share."""
+"""Level flight in moving air: the part that the plants `kinematic`, `lagged` and `coordinated` share."""
 
 import math
 
@@ -10,16 +10,16 @@ _UNKNOWN = (math.nan,) * (State._fields.index("throttle") - State._fields.index(
 
 
 class Level:
-    """The air that carries a level flight, at once: Eq. (1).
+    """The air carries the aircraft at once, as in Eq. (1), at constant altitude.
 
-    What is shown of its gusts is their velocity now; the way between is the mean's.
+    The state holds the gust velocity of the present step; the displacement over a period is the integral of the gusts.
     """
 
     def __init__(self, start: Start, air: Air) -> None:
         self._altitude, self._air, self._step = start.altitude, air, 0
 
     def carried(self, period: float) -> tuple[float, float]:
-        """How far the air moves in the next `period` seconds; m north, east."""
+        """Moves on by `period` seconds and returns the displacement of the air in that time, m north and east."""
         air, begin = self._air, self._step
         self._step += round(period / air.step)
         W_x, W_y = air.steady
@@ -37,7 +37,7 @@ class Level:
         roll_rate: float = math.nan,
         bank_command: float = math.nan,
     ) -> State:
-        """The state now: position, air velocity, and what the plant has beside."""
+        """The state now, from position, airspeed `v_a` and heading `psi`; SI, rad; NaN for what the plant lacks."""
         W_x, W_y = self._air.horizontal(self._step)
         return State._make(
             (

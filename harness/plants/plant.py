@@ -1,4 +1,4 @@
-"""A plant: everything below the heading-rate command."""
+"""The protocol of a plant: everything below the heading-rate command, from its start to its end."""
 
 import math
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ _SENTENCES: Mapping[Outcome, str] = MappingProxyType(
 
 
 class End(Exception):  # noqa: N818 - an end is not an error
-    """The flight cannot go on: raised by a plant, caught by `simulate`, told in the log."""
+    """The flight ends early: raised by plant, law or estimator, caught by `simulate`, which puts it into the log."""
 
     def __init__(self, outcome: Outcome, reason: str) -> None:
         super().__init__(reason)
@@ -59,7 +59,7 @@ class End(Exception):  # noqa: N818 - an end is not an error
 
 
 class PlantError(HarnessError, ValueError):
-    """The plant cannot be started with these settings; `key` is the one to change."""
+    """The plant cannot start with these settings; `key` is the dotted name of the setting to change."""
 
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
@@ -68,7 +68,7 @@ class PlantError(HarnessError, ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Where and how a flight starts: level, in trim, at its nominal airspeed."""
+    """Where and how a flight starts: level, in trim, at its nominal airspeed. SI, rad."""
 
     position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (-200.0, 200.0)
     heading: Annotated[Degrees, About("direction of the air velocity, clockwise from north")] = math.radians(30.0)
@@ -80,16 +80,18 @@ class Flying(Protocol):
     """A plant in flight."""
 
     @property
-    def state(self) -> State: ...
+    def state(self) -> State:
+        """The aircraft now."""
+        ...
 
     def advance(self, heading_rate: float, period: float) -> None:
-        """Fly on for `period` seconds with this heading-rate command (rad/s) held. Raises `End` when it cannot."""
+        """Flies on for `period` seconds with this heading-rate command, rad/s. Raises `End` when the flight ends."""
         ...
 
 
 class Plant(Protocol):
-    """A model of the aircraft with its inner loop: a frozen value."""
+    """A model of the aircraft with its inner loop: a frozen value, whose flights are started by `start`."""
 
     def start(self, start: Start, air: Air) -> Flying:
-        """The aircraft at `start` in this air. Raises `PlantError` when it cannot fly so."""
+        """The aircraft in flight, at `start` in this air. Raises `PlantError` when it cannot fly there."""
         ...

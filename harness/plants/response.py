@@ -1,4 +1,4 @@
-"""A linear response of gain one to a held and delayed command, and its exact propagation between commands."""
+"""A linear response of static gain one to a delayed command, and its exact motion while the command is held."""
 
 import math
 from collections import deque
@@ -17,31 +17,32 @@ from autopilot.quantities import About, Seconds
 Array = NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
-LONGEST = 50_000_000  # ns: a longer stretch is cut into equal pieces, for the nodes within to follow the motion
+LONGEST = 50_000_000  # ns: longer intervals are cut into equal pieces, so that the nodes resolve the motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """A delay, the bank's second order with a zero, a sideslip mode with its zeros, and the slow tail a trim leaves.
+    """The structure that is identified: delay, bank mode with a zero, sideslip mode with two zeros, slow tail.
 
         exp(-delay s) (1 + lead s) / q(s; bank) q(s; zero) / q(s; sideslip) (1 + (1 - share) s / rate) / (1 + s / rate)
 
-    with q(s; w, z) = 1 + 2 z s / w + (s / w)^2 and the tail's share and rate. Its gain is one.
+    with q(s; w, z) = 1 + 2 z s / w + (s / w)^2. The static gain is one. The tail is the slow end of the response that
+    the rate trim, an integrator, leaves; `share` and `rate` are `tail_share` and `tail_rate`.
     """
 
     delay: Annotated[Seconds, Ge(0), Lt(10), About("from the command to its first effect")]
-    frequency: Annotated[float, Gt(0), About("rad/s: of the bank's second order")]
-    damping: Annotated[float, Gt(0), About("of the bank's second order")]
-    lead: Annotated[Seconds, About("its zero: what comes at once, as the side force of a deflection")]
+    frequency: Annotated[float, Gt(0), About("rad/s: of the bank mode")]
+    damping: Annotated[float, Gt(0), About("of the bank mode")]
+    lead: Annotated[Seconds, About("of the zero: the part that acts at once, such as the side force of a deflection")]
     sideslip_frequency: Annotated[float, Gt(0), About("rad/s: of the sideslip mode")]
     sideslip_damping: Annotated[float, Gt(0), About("of the sideslip mode")]
     zero_frequency: Annotated[float, Gt(0), About("rad/s: of the zeros that nearly cancel the sideslip mode")]
     zero_damping: Annotated[float, About("of those zeros")]
-    tail_rate: Annotated[float, Gt(0), About("1/s: of the slow end of the response")]
-    tail_share: Annotated[float, About("how much of the response comes with that slow end")]
+    tail_rate: Annotated[float, Gt(0), About("1/s: of the slow tail")]
+    tail_share: Annotated[float, About("share of the response that arrives with the slow tail")]
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """(A, b, c) of x' = A x + b u(t - delay), y = c x."""
+        """(A, b, c) of x' = A x + b u(t - delay), y = c x; shapes (5, 5), (5,), (5,)."""
         A, b, c = np.zeros((5, 5)), np.zeros(5), np.zeros(5)
         w, z = self.frequency, self.damping
         A[0, 1], A[1, :2], b[1] = 1.0, (-w * w, -2.0 * z * w), w * w
@@ -61,7 +62,7 @@ class Response:
         return A, b, c
 
     def at(self, omega: Array) -> NDArray[np.complex128]:
-        """The frequency response at these rad/s."""
+        """The complex frequency response at these frequencies, rad/s; the shape of `omega`."""
         s = 1j * np.asarray(omega, dtype=float)
         numerator = (
             (1.0 + self.lead * s)
@@ -76,7 +77,7 @@ class Response:
         return np.asarray(np.exp(-s * self.delay) * numerator / denominator)
 
     def quicker(self, times: float) -> Self:
-        """The same response so many times as quick."""
+        """The same response with a time scale shorter by the factor `times`."""
         return replace(
             self,
             delay=self.delay / times,
@@ -89,28 +90,31 @@ class Response:
 
     @property
     def bandwidth(self) -> float:
-        """Where the gain first falls through -3 dB, rad/s."""
+        """The frequency at which the gain first falls below -3 dB, rad/s."""
         omega = self.frequency * np.geomspace(1e-3, 1e3, 6001)
         return float(omega[int(np.argmax(np.abs(self.at(omega)) < math.sqrt(0.5)))])
 
     def sampled(self, period: float, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """From a command held for `period` to the output's integral, and to that one's, at its instants: (z's, 2)."""
+        """Transfer functions of the sampled response, at the points `z`; shape (len(z), 2).
+
+        From a command held for `period` seconds to the output's first and second integral at the sampling instants.
+        """
         A, b, c = self.matrices()
         n = len(b)
         system = np.zeros((n + 3, n + 3))
         system[:n, :n], system[:n, -1], system[n, :n], system[n + 1, n] = A, b, c, 1.0
-        whole = math.floor(self.delay / period)
-        late = self.delay - whole * period
+        periods = math.floor(self.delay / period)  # whole ones in the delay
+        late = self.delay - periods * period
         before, after = expm(system * late), expm(system * (period - late))
         step = (after @ before)[:-1, :-1]
         now, earlier = after[:-1, -1], after[:-1, :-1] @ before[:-1, -1]
-        drive = np.multiply.outer(z, now) + earlier  # times 1/z: of the command now and of the one before
+        drive = np.multiply.outer(z, now) + earlier  # times 1/z: the command of this period and of the one before
         left = z[:, np.newaxis, np.newaxis] * np.eye(n + 2) - step
-        return np.asarray(np.linalg.solve(left, drive[:, :, np.newaxis])[:, n:, 0] * z[:, np.newaxis] ** (-whole - 1))
+        return np.asarray(np.linalg.solve(left, drive[:, :, np.newaxis])[:, n:, 0] * z[:, np.newaxis] ** (-periods - 1))
 
 
 def plain(delay: float, frequency: float, damping: float) -> Response:
-    """The second order alone, without sideslip or tail."""
+    """A delay (s) and a second order (rad/s, damping ratio) alone, without zero, sideslip mode or tail."""
     return Response(
         delay=delay, frequency=frequency, damping=damping, lead=0.0,
         sideslip_frequency=frequency, sideslip_damping=damping,
@@ -123,7 +127,10 @@ def _q(s: NDArray[np.complex128], w: float, z: float) -> NDArray[np.complex128]:
 
 
 def gauss(count: int) -> tuple[Array, Array, Array]:
-    """Gauss's nodes on [0, 1], the weights of the integral to 1, and of those to each node, (nodes, nodes)."""
+    """Gauss quadrature on [0, 1] with `count` nodes: (nodes, weights, weights to the nodes).
+
+    The weights give the integral from 0 to 1; row i of the last, shape (count, count), gives that from 0 to node i.
+    """
     x, w = np.polynomial.legendre.leggauss(count)
     nodes = 0.5 * (x + 1.0)
     powers = np.arange(1, count + 1)
@@ -132,16 +139,16 @@ def gauss(count: int) -> tuple[Array, Array, Array]:
 
 
 class Piece(NamedTuple):
-    """The motion over one stretch with the input held: rows to multiply (states, input) with."""
+    """The motion over an interval with the input held, as rows that multiply the vector (states, input)."""
 
     length: float  # s
-    outputs: Rows  # of the output at Gauss's nodes
-    integrals: Rows  # of the output's integral up to each node, and to the end
-    end: Rows  # of the states at the end
+    outputs: Rows  # the output at each of Gauss's nodes
+    integrals: Rows  # the output's integral up to each node, then up to the end
+    end: Rows  # the states at the end
 
 
 class Propagator:
-    """A response in motion: exact while the command is held, whatever the delay. Times are counted in nanoseconds."""
+    """A response in time, started at rest: exact while a command is held, for any delay. Counts time in nanoseconds."""
 
     def __init__(self, response: Response, nodes: int) -> None:
         A, b, c = response.matrices()
@@ -159,15 +166,19 @@ class Propagator:
 
     @property
     def output(self) -> float:
+        """The output now, in the unit of the command."""
         return dot(self._output, self._states)
 
     @property
     def slope(self) -> float:
-        """The output's rate of change."""
+        """The output's rate of change now, per second."""
         return dot(self._slope, (*self._states, self._input))
 
     def pieces(self, command: float, period: float) -> Iterator[tuple[tuple[float, ...], Piece]]:
-        """The next `period` seconds with this command given now: ((states, input) at its start, piece), one by one."""
+        """Moves on by `period` seconds with `command` given now, in pieces within which the delayed input is constant.
+
+        Yields for each piece the vector (states, input) at its start, and the `Piece` whose rows multiply it.
+        """
         self._coming.append((self._delay, command))
         left = round(period * 1e9)
         while left:
@@ -183,7 +194,7 @@ class Propagator:
             left -= length
 
     def _piece(self, length: int) -> tuple[int, Piece]:
-        """A stretch of so many nanoseconds: the number of equal pieces, and the piece."""
+        """The number of equal pieces in an interval of `length` nanoseconds, and the piece."""
         if length not in self._pieces:
             count = -(-length // LONGEST)
             h, n = 1e-9 * length / count, self._order
@@ -199,6 +210,6 @@ def _row(values: Array) -> tuple[float, ...]:
 
 
 def dot(row: Sequence[float], values: Sequence[float]) -> float:
-    """The scalar product, in this order of terms on every machine."""
+    """The scalar product, summed in the order of the terms: the same bits on every machine."""
     total: float = sum(map(mul, row, values))
     return total

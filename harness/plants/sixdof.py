@@ -1,4 +1,7 @@
-"""The 6-DOF plant: a JSBSim airframe with its native inner loop. The only file with JSBSim, and with feet, in it."""
+"""The plant `sixdof`: a JSBSim airframe under its native inner loop. The only file that imports JSBSim or uses feet.
+
+In this order: loading a model, trimming it, engaging its inner loop, flying it.
+"""
 
 import math
 import re
@@ -24,7 +27,7 @@ FT = 0.3048  # m
 SLUG = 4.4482216152605 / FT  # kg
 _SI = {"ft": FT, "fps": FT, "sqft": FT**2, "slugs": SLUG, "slugs_ft2": SLUG * FT**2}
 RADIUS = 6371000.0  # m, as in planet.xml
-GROUND = 15.0  # m: below this height the flight has ended
+GROUND = 15.0  # m above the ground: a flight ends below it
 DEPARTURE_BANK = math.radians(80.0)
 STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
@@ -35,7 +38,7 @@ _AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
 
 
 class _LoadLog(jsbsim.FGLogger):
-    """Keeps what JSBSim reports at WARN or above: it tells Python nothing else of a model it could not read whole."""
+    """Keeps JSBSim's messages of level WARN and above: the only sign in Python of a model that was read in part."""
 
     def __init__(self) -> None:
         self.problems: list[str] = []
@@ -56,14 +59,14 @@ jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # as its stub
 
 
 class ModelError(PlantError):
-    """JSBSim could not load the model as it is written."""
+    """JSBSim cannot load the airframe's model, or the model lacks a property."""
 
     def __init__(self, message: str) -> None:
         super().__init__("aircraft", message)
 
 
 def _properties(airframe: Path) -> list[str]:
-    """Every property that the model and its inner loop read."""
+    """The names of all properties that the model and its inner loop read."""
     files = (aircraft.model(airframe), _INNER_LOOP / "inner_loop.xml")
     texts = (text for file in files for text in ElementTree.parse(file).getroot().itertext())
     return sorted({name for text in texts for name in _PROPERTY.findall(text)})
@@ -74,7 +77,7 @@ class NoTrimError(ValueError):
 
 
 def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
-    """A fresh JSBSim with this airframe, stepping every `step` seconds. Raises `ModelError` with what JSBSim said."""
+    """A new JSBSim with this airframe and its inner loop, stepping by `step` seconds. Raises `ModelError`."""
     _load_log.problems.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_dt(step)  # before the model: its components keep the step they were made with
@@ -97,12 +100,12 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
 
 
 def write(fdm: jsbsim.FGFDMExec, name: str, value: float) -> None:
-    """Sets a property that exists: JSBSim creates one for every mistyped name."""
+    """Sets an existing property, in JSBSim's unit. `ModelError` for an unknown name, which JSBSim would create."""
     _node(fdm, name).set_double_value(value)
 
 
 def si(fdm: jsbsim.FGFDMExec, name: str) -> float:
-    """A property in SI, by the unit in which its name ends."""
+    """A property in SI: the suffix of its name gives the unit. rad and dimensionless numbers stay as they are."""
     return fdm[name] * _SI.get(name.rpartition("-")[2], 1.0)
 
 
@@ -117,7 +120,7 @@ _NUDGE = 1e-5  # rad, or of the throttle
 
 
 class Trim(NamedTuple):
-    """Steady level flight: rad, rad, 0-1."""
+    """Pitch, rad, elevator, rad, and throttle, 0 to 1, of steady level flight."""
 
     pitch: float
     elevator: float
@@ -125,10 +128,10 @@ class Trim(NamedTuple):
 
 
 def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
-    """Puts the aircraft at `start`, level and unaccelerated in the wind there, and gives the trim that does it.
+    """Puts the aircraft at `start`, level and unaccelerated in the wind there, and returns its trim.
 
-    Newton's method on the accelerations that JSBSim reports, with the surfaces placed directly: their actuators do not
-    run before engagement, so no lag falsifies the result. Raises `NoTrimError` where there is none.
+    Newton's method on the accelerations that JSBSim computes. It places the surfaces directly: the actuators do not run
+    before the inner loop is engaged, so their lag cannot falsify the result. Raises `NoTrimError` without a solution.
     """
     _place(fdm, start, air.horizontal(0))
     x = Trim(pitch=0.05, elevator=0.0, throttle=0.5)
@@ -147,13 +150,13 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
 
 
 def _slope(fdm: jsbsim.FGFDMExec, x: Trim, i: int, residual: Vector) -> Vector:
-    """The change of the accelerations per unit of the i-th unknown."""
+    """The derivative of the accelerations by the i-th unknown, a forward difference."""
     u, w, q = _accelerations(fdm, Trim._make(v + _NUDGE * (i == j) for j, v in enumerate(x)))
     return (u - residual[0]) / _NUDGE, (w - residual[1]) / _NUDGE, (q - residual[2]) / _NUDGE
 
 
 def _solve(a: Vector, b: Vector, c: Vector, r: Vector) -> Vector:
-    """Solves [a b c] x = r by Cramer's rule: the same bits everywhere, which a linear algebra library's are not."""
+    """Solves [a b c] x = r by Cramer's rule: the same bits on every machine, unlike a linear algebra library."""
     det = _dot(a, _cross(b, c)) or math.nan
     return _dot(r, _cross(b, c)) / det, _dot(a, _cross(r, c)) / det, _dot(a, _cross(b, r)) / det
 
@@ -167,9 +170,9 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 
 def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: tuple[float, float]) -> None:
-    """The initial condition in the order that JSBSim needs: attitude, wind, then velocity over the ground.
+    """Writes the initial condition in the order that JSBSim needs: attitude, wind, then velocity over the ground.
 
-    The start lies on the equator, where the local north turns least along the way.
+    The flight starts on the equator, where the direction of north changes least along the way.
     """
     W_x, W_y = wind
     write(fdm, "ic/lat-geod-rad", 0.0)
@@ -184,7 +187,7 @@ def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: tuple[float, float]) -> No
     write(fdm, "ic/ve-fps", (start.airspeed * math.sin(start.heading) + W_y) / FT)
     write(fdm, "ic/vd-fps", 0.0)
     ahead = start.airspeed + W_x * math.cos(start.heading) + W_y * math.sin(start.heading)
-    write(fdm, "ic/q-rad_sec", -ahead / RADIUS)  # level on a sphere is turning down with it
+    write(fdm, "ic/q-rad_sec", -ahead / RADIUS)  # level flight over a sphere pitches down with it
     _connect(fdm, False)
 
 
@@ -256,7 +259,10 @@ _READ = (
 
 @dataclass(frozen=True, slots=True)
 class SixDof:
-    """A JSBSim airframe under its native inner loop, stepped every `step` seconds."""
+    """A JSBSim airframe, given by its folder, under its native inner loop, stepped by `step` seconds.
+
+    `rate_trim` switches the slow integrator that removes the turn-rate shortfall of a bank-only turn.
+    """
 
     airframe: Path
     step: float
@@ -283,9 +289,10 @@ class SixDof:
 
 
 def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
-    """What puts the air's next gust into JSBSim: that at the end of the step that `run()` then makes.
+    """A function that puts the next gust and rotation of the air into JSBSim; to be called before each `run()`.
 
-    The aircraft started in trim in the horizontal air at the start, which JSBSim has as its steady wind.
+    The values are those at the end of the step that `run()` then makes. JSBSim's own steady wind is the
+    horizontal wind at the start, in which the aircraft was trimmed: gusts are the difference to it.
     """
     set_x, set_y, set_z, roll, pitch, yaw = (
         _node(fdm, name).set_double_value
@@ -300,7 +307,7 @@ def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
     table = np.column_stack([(air.gusts - (met_x, met_y, 0.0)) / FT, air.rotation(FT * fdm["metrics/bw-ft"])])
     blocks = (
         table[k : k + 1000].tolist() for k in range(0, len(table), 1000)
-    )  # as lists they take four times the room
+    )  # in blocks: as lists, the whole table would take four times its memory
     rows, sin, cos = chain.from_iterable(blocks), math.sin, math.cos
 
     def blow() -> None:
@@ -370,12 +377,12 @@ class _SixDofFlying:
             raise End(Outcome.DEPARTED, f"stalled for {STALL_TIME:g} s")
 
     def _heading(self) -> float:
-        """The direction of the velocity in the steady air."""
+        """psi_a, rad: the direction of (ground velocity - steady wind)."""
         W_x, W_y = self._wind
         return math.atan2(FT * self._velocity_east() - W_y, FT * self._velocity_north() - W_x)
 
     def _read(self, before: float) -> State:
-        """The state now; `before` is the heading one step ago, which gives its rate (over that step)."""
+        """The state now. `before` is the heading one step ago: the heading rate is the mean over that step."""
         n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z, *others = [
             get() for get in self._readers
         ]

@@ -14,7 +14,7 @@ def bank_of_turn(airspeed: float, heading_rate: float) -> float:
 
 
 def banks_of_turns(airspeed: NDArray[np.float64], heading_rate: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same of arrays, element by element."""
+    """`bank_of_turn` of arrays, element by element; bit for bit the same numbers."""
     banks: NDArray[np.float64] = np.vectorize(bank_of_turn, otypes=[np.float64])(airspeed, heading_rate)
     return banks
 

@@ -1,4 +1,4 @@
-"""The air of one flight: a steady wind, and what it does beyond that, the same for whatever flies in it."""
+"""The air of one flight: steady wind, shear, gusts and turbulence, the same for every plant and law."""
 
 import math
 from collections.abc import Callable
@@ -17,18 +17,19 @@ def _calm() -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Air:
-    """Velocities of the air, m/s towards north, east, down, on a grid of steps: never the plant's or the law's own.
+    """The velocity of the air, m/s, towards north, east, down, on a grid of time steps.
 
-    Between two steps the gusts go in a straight line; without any, the air is steady for ever.
+    It depends on neither plant nor law. Between two steps the gusts are linear in time. Without gusts the air is steady
+    and has no grid.
     """
 
     steady: tuple[float, float] = (0.0, 0.0)
-    shear: tuple[float, float] = (0.0, 0.0)  # of the steady wind, m/s per metre above `altitude`
-    altitude: float = 0.0  # m: where the wind is the steady one
-    step: float = math.inf  # s: of the grid
-    gusts: Array = field(default_factory=_calm)  # (steps + 1, 3), beyond the steady wind
-    turbulence: Callable[[float], Array] | None = None  # how its turbulence turns over a wing of this span, m
-    _way: Array = field(init=False)  # (steps + 1, 2): how far they have carried since the start, north, east
+    shear: tuple[float, float] = (0.0, 0.0)  # change of the steady wind, north and east, m/s per metre above `altitude`
+    altitude: float = 0.0  # m: at which the wind has no shear added
+    step: float = math.inf  # s, of the grid
+    gusts: Array = field(default_factory=_calm)  # (steps + 1, 3), m/s, added to the steady wind
+    turbulence: Callable[[float], Array] | None = None  # its rotation by the wing span, m: see `rotation`
+    _way: Array = field(init=False)  # (steps + 1, 2): integral of the gusts since the start, m, north and east
 
     def __post_init__(self) -> None:
         horizontal = self.gusts[:, :2]
@@ -37,26 +38,27 @@ class Air:
         object.__setattr__(self, "_way", way)
 
     def gust(self, k: int) -> Vector:
-        """The velocity beyond the steady wind at the k-th step, at `altitude`."""
+        """The gust at the k-th step, at `altitude`: m/s towards north, east, down, without the steady wind."""
         if not len(self.gusts):
             return 0.0, 0.0, 0.0
         north, east, down = self.gusts[k].tolist()
         return north, east, down
 
     def horizontal(self, k: int) -> tuple[float, float]:
-        """The whole horizontal wind at the k-th step, at `altitude`; north, east."""
+        """Steady wind plus gust at the k-th step, at `altitude`: m/s towards north, east."""
         (W_x, W_y), (gust_x, gust_y, _) = self.steady, self.gust(k)
         return W_x + gust_x, W_y + gust_y
 
     def rotation(self, span: float) -> Array:
-        """The air's rotation over a wing of this span (m), rad/s: (steps + 1, 4).
+        """The rotation of the air over a wing of this span, m, at each step: (steps + 1, 4), rad/s.
 
-        Roll rate, pitch rate, and two parts of the yaw rate, which is east cos(yaw) - north sin(yaw): north, east.
+        The columns are roll rate, pitch rate, and two numbers `north`, `east` from which an aircraft's heading gives
+        the yaw rate: east cos(yaw) - north sin(yaw). Zero without turbulence.
         """
         return self.turbulence(span) if self.turbulence else np.zeros((len(self.gusts), 4))
 
     def drift(self, begin: int, end: int) -> tuple[float, float]:
-        """How far, m, the gusts carry something that follows them at once, between two steps; north, east."""
+        """The integral of the gusts from step `begin` to step `end`: m north, east."""
         if not len(self.gusts):
             return 0.0, 0.0
         north, east = (self._way[end] - self._way[begin]).tolist()

@@ -1,8 +1,8 @@
-"""Random numbers by seed and purpose."""
+"""Random streams, named by seed and purpose."""
 
 import numpy as np
 
 
 def stream(seed: int, purpose: str) -> np.random.Generator:
-    """Random numbers that the seed and their purpose name: never the position in a matrix, the plant or the law."""
+    """A random stream that depends on the seed and its purpose alone, never on matrix position, plant or law."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=tuple(purpose.encode()))))

@@ -1,4 +1,4 @@
-"""The target on the ground: in segments of constant acceleration and turn rate, in closed form; or as recorded."""
+"""The target on the ground: it moves in segments of constant acceleration and turn rate, or along a recorded track."""
 
 import math
 from bisect import bisect_right
@@ -12,23 +12,23 @@ from annotated_types import Ge, Le
 from autopilot.quantities import About, Degrees, DegreesPerSecond, Metres, MetresPerSecond, MetresPerSecond2, Seconds
 from harness.world.track import load_track
 
-_FASTEST_TURN = math.radians(1000.0)  # far beyond any target; keeps the closed form's angles meaningful
+_FASTEST_TURN = math.radians(1000.0)  # far beyond any target: larger angles would lose their digits
 
 
 class TargetState(NamedTuple):
-    """The target at one moment. SI, rad, north-east."""
+    """The target at one moment. SI, rad, north and east of the flight's origin."""
 
     target_north: float
     target_east: float
     target_velocity_north: float
     target_velocity_east: float
-    target_acceleration: float = 0.0  # rate of its speed
-    target_turn_rate: float = 0.0
+    target_acceleration: float = 0.0  # rate of change of its speed
+    target_turn_rate: float = 0.0  # clockwise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """A time in which the target accelerates, turns, or both. Where segments overlap, they add up."""
+    """An interval in which the target accelerates, turns, or both. Overlapping segments add up."""
 
     from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
     to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
@@ -47,7 +47,7 @@ class Target:
     track: Annotated[str | None, About("a recorded track instead, a CSV: time_s, north_m, east_m")] = None
 
     def start(self) -> Callable[[float], TargetState]:
-        """The motion: `at(time)` in s gives the target's state. Raises `TrackError`."""
+        """The motion as a function of the time, s, with the state as its value. Raises `TrackError`."""
         if self.track is not None:
             recorded = load_track(Path(self.track)).at
             return lambda time: TargetState._make(recorded(time))
@@ -59,11 +59,11 @@ class Target:
         return lambda time: legs[bisect_right(begins, time) - 1].at(time)
 
     def breakpoints(self) -> list[float]:
-        """The times at which the motion changes its formula."""
+        """The times, s, at which acceleration or turn rate changes; of a track, the times of its rows."""
         return load_track(Path(self.track)).begins if self.track is not None else [leg.begin for leg in self.legs()]
 
     def legs(self) -> list["Leg"]:
-        """The motion without a track, cut at every change of acceleration or turn rate; the last leg has no end."""
+        """The motion of the segments, cut at every change of acceleration or turn rate; the last leg has no end."""
         cuts = sorted({0.0, *(s.from_ for s in self.segments), *(s.to for s in self.segments)})
         legs: list[Leg] = []
         n, e, speed, heading = *self.position, self.speed, self.heading
@@ -81,7 +81,7 @@ class Target:
 
 
 class Leg(NamedTuple):
-    """Motion at constant acceleration and turn rate from `begin` on."""
+    """Motion at constant acceleration and turn rate from time `begin`, s, on. SI, rad."""
 
     begin: float
     north: float
@@ -92,6 +92,7 @@ class Leg(NamedTuple):
     turn_rate: float
 
     def at(self, time: float) -> TargetState:
+        """The state at `time`, s, in closed form."""
         t = time - self.begin
         a, w = self.acceleration, self.turn_rate
         v0, v = self.speed, self.speed + a * t

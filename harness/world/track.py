@@ -1,8 +1,8 @@
-"""A recorded track of the target: a CSV of times and positions, read with located errors and joined smoothly.
+"""A recorded track of the target: a CSV file of times and positions, interpolated smoothly.
 
-Between the rows runs a cubic spline (not-a-knot): velocity, acceleration and turn rate are continuous, and a track that
-is a cubic in time comes back exactly. A monotone interpolant (PCHIP) would not swing where a target starts or stops,
-but its acceleration jumps at every row, and the law would be fed these jumps as the target's.
+The interpolant is a cubic spline (not-a-knot): velocity, acceleration and turn rate are continuous, and a track that is
+a cubic in time is reproduced exactly. A monotone interpolant (PCHIP) would not oscillate where a target starts or
+stops, but its acceleration jumps at every row, and the law would take these jumps for the target's.
 """
 
 import math
@@ -14,26 +14,27 @@ from typing import NamedTuple
 from harness.error import HarnessError
 
 HEADER = ("time_s", "north_m", "east_m")
-FEWEST = 4  # rows that fix a cubic
+FEWEST = 4  # rows: as many as determine a cubic
 LARGEST = 1e9  # s or m
 
 _SLOWEST = 1e-6  # m/s: a slower target has no direction
 _Row = tuple[float, float, float]
-TargetMotion = tuple[float, float, float, float, float, float]  # north, east, their rates, that of the speed, turn rate
+TargetMotion = tuple[float, float, float, float, float, float]  # the fields of `TargetState`, in their order
 
 
 class TrackError(HarnessError, ValueError):
-    """What is wrong with a track, in one line: `FILE:LINE: what`."""
+    """A mistake in a track's file, in one line: `FILE:LINE: what is wrong`."""
 
 
 class Cubic(NamedTuple):
-    """The track from `begin` to the next row: cubics in the time since, the highest power's coefficient first."""
+    """The track from the row at `begin`, s, to the next: coefficients in (time - begin), highest power first. SI."""
 
     begin: float
     north: list[float]
     east: list[float]
 
     def at(self, time: float) -> TargetMotion:
+        """The target's motion at `time`, s. SI, rad, turning clockwise."""
         t = time - self.begin
         (x3, x2, x1, x0), (y3, y2, y1, y0) = self.north, self.east
         v_x, v_y = (3.0 * x3 * t + 2.0 * x2) * t + x1, (3.0 * y3 * t + 2.0 * y2) * t + y1
@@ -46,14 +47,14 @@ class Cubic(NamedTuple):
 
 
 class Track:
-    """The whole curve. The flight begins at time 0 and must end by `end`, s."""
+    """The track as a function of time. It ends at `end`, s."""
 
     def __init__(self, cubics: list[Cubic], end: float) -> None:
         self.begins, self.end = [cubic.begin for cubic in cubics], end
         self._cubics = cubics
 
     def at(self, time: float) -> TargetMotion:
-        """The target's motion at `time`, s. SI, rad, turning clockwise."""
+        """The target's motion at `time`, s; beyond the last row it continues with the last cubic."""
         return self._cubics[max(0, bisect_right(self.begins, time) - 1)].at(time)
 
 
@@ -67,13 +68,13 @@ def load_track(path: Path) -> Track:
         raise TrackError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise TrackError(f"{path}: no text in UTF-8") from None
-    except ValueError as error:  # no path at all
+    except ValueError as error:  # not a path, e.g. with a null character
         raise TrackError(f"{str(path)!r}: {error}") from None
 
 
 @lru_cache(maxsize=16)
 def _load(path: Path, modified: int) -> Track:
-    from scipy.interpolate import CubicSpline  # takes a tenth of a second: who has no track does without
+    from scipy.interpolate import CubicSpline  # late: it takes a tenth of a second to import
 
     times, norths, easts = zip(*_rows(path), strict=True)
     north, east = (CubicSpline(times, values).c.T.tolist() for values in (norths, easts))

@@ -1,8 +1,8 @@
-"""Turbulence: the Dryden model of MIL-F-8785C at low altitude, as velocities and rotations of the air met in flight.
+"""Turbulence: the Dryden model of MIL-F-8785C at low altitude, as velocities and rotations of the air.
 
-The gust field is frozen and met at the nominal airspeed V: a wave number W (rad/m) is the frequency w = V W (rad/s).
-Spectra are one-sided, per rad/s: their integral from 0 to infinity is the variance. Feet are those of the standard's
-empirical formulas alone.
+The gust field is frozen and traversed at the nominal airspeed V: a wave number W (rad/m) is met as the frequency
+w = V W (rad/s). Spectra are one-sided, per rad/s: their integral from 0 to infinity is the variance. The standard's
+empirical formulas take the height in feet; that conversion is the only one here.
 """
 
 import math
@@ -19,15 +19,15 @@ from harness.world.air import Array
 from harness.world.randomness import stream
 
 KNOT = 0.514444  # m/s
-FOOT = 0.3048  # m
-# The wind 20 ft above the ground that stands for each severity.
+FOOT = 0.3048  # m, for the standard's formulas
+# The wind speed 20 ft above the ground that defines each severity, m/s.
 W20 = MappingProxyType({"light": 15.0 * KNOT, "moderate": 30.0 * KNOT, "severe": 45.0 * KNOT})
-LEAD = 2.0  # s that the field is begun before the flight, for filters of the rotation to forget their start
+LEAD = 2.0  # s: the field begins this long before the flight, so that the filters of the rotation have settled
 
 
 @dataclass(frozen=True, slots=True)
 class Dryden:
-    """The model at one airspeed and altitude: intensities in m/s, scale lengths in m."""
+    """The Dryden model at one airspeed V, m/s, and altitude: intensities sigma in m/s, scale lengths L in m."""
 
     V: float
     sigma_w: float
@@ -36,7 +36,7 @@ class Dryden:
     L_u: float  # of u and v alike
 
     def along(self, omega: Array) -> Array:
-        """Spectrum of u, along the mean wind."""
+        """Spectrum of u, along the mean wind, (m/s)^2 per rad/s; `omega` in rad/s."""
         T = self.L_u / self.V
         return np.asarray(2.0 * self.sigma_u**2 * T / np.pi / (1.0 + (T * omega) ** 2))
 
@@ -49,20 +49,20 @@ class Dryden:
         return _transverse(self.sigma_w, self.L_w / self.V, omega)
 
     def roll(self, omega: Array, span: float) -> Array:
-        """Spectrum of p."""
+        """Spectrum of the roll rate p, (rad/s)^2 per rad/s, over a wing of this span, m."""
         low = self.sigma_w**2 / (self.V * self.L_w) * 0.8 * (math.pi * self.L_w / (4.0 * span)) ** (1.0 / 3.0)
         return np.asarray(low / (1.0 + (self.lag(4, span) * omega) ** 2))
 
     def pitch(self, omega: Array, span: float) -> Array:
-        """Spectrum of q."""
+        """Spectrum of the pitch rate q."""
         return (omega / self.V) ** 2 / (1.0 + (self.lag(4, span) * omega) ** 2) * self.vertical(omega)
 
     def yaw(self, omega: Array, span: float) -> Array:
-        """Spectrum of r, of flight along the mean wind."""
+        """Spectrum of the yaw rate r, in flight along the mean wind."""
         return (omega / self.V) ** 2 / (1.0 + (self.lag(3, span) * omega) ** 2) * self.across(omega)
 
     def lag(self, n: int, span: float) -> float:
-        """What the wing averages over, n b / pi, as a time constant."""
+        """The time constant, s, of the wing's averaging over n b / pi metres."""
         return n * span / (math.pi * self.V)
 
 
@@ -72,7 +72,7 @@ def _transverse(sigma: float, T: float, omega: Array) -> Array:
 
 
 def dryden(severity: str, airspeed: float, altitude: float) -> Dryden:
-    """MIL-F-8785C, 3.7.3.4, low altitude: scale lengths and intensities from the height above ground."""
+    """MIL-F-8785C, 3.7.3.4, low altitude: scale lengths and intensities from the height above ground, m."""
     h = altitude / FOOT
     shape = 0.177 + 0.000823 * h
     sigma_w = 0.1 * W20[severity]
@@ -81,7 +81,7 @@ def dryden(severity: str, airspeed: float, altitude: float) -> Dryden:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Turbulence:
-    """One realisation of the model on a grid of steps; begun `lead` rows before the flight."""
+    """One realisation of the model on a grid of steps of `step` seconds; its first `lead` rows precede the flight."""
 
     model: Dryden
     seed: int
@@ -90,10 +90,10 @@ class Turbulence:
     velocity: Array  # (lead + steps + 1, 3): north, east, down, m/s
 
     def rotation(self, span: float) -> Array:
-        """The air's rotation as a wing of this span (m) meets it, rad/s: (steps + 1, 4).
+        """The rotation of the air over a wing of this span, m, at each step of the flight: (steps + 1, 4), rad/s.
 
-        Its columns: roll rate p; pitch rate q; and the gradients along the path of the velocities north and east,
-        which make the yaw rate r = east cos(yaw) - north sin(yaw). In a rotation, -q = dw/dx and r = dv/dx (x ahead,
+        The columns are roll rate p, pitch rate q, and the gradients along the path of the velocities north and east,
+        from which the yaw rate is r = east cos(yaw) - north sin(yaw). In a rotation -q = dw/dx and r = dv/dx (x ahead,
         y right, z down); in a frozen field d/dx is d/dt over V.
         """
         model, rows = self.model, len(self.velocity)
@@ -107,9 +107,9 @@ class Turbulence:
 
 
 def turbulence(model: Dryden, towards: float, seed: int, step: float, steps: int) -> Turbulence:
-    """The turbulence that a seed makes, its axes along the mean wind's direction `towards` (rad, from north).
+    """The turbulence of a seed; u is along the direction `towards` of the mean wind, rad, clockwise from north.
 
-    The same for whatever flies in it; a longer flight's begins as a shorter one's does.
+    It depends on neither plant nor law. A longer flight begins with the turbulence of a shorter one.
     """
     lead = math.ceil(LEAD / step)
     noise = stream(seed, "turbulence").standard_normal((lead + steps + 1, 5))
@@ -132,9 +132,9 @@ def _second_order(T: float, step: float, noise: Array) -> Array:
 
 
 def _lagged(T: float, step: float, noise: Array) -> Array:
-    """White noise of unit intensity through 1 / (1 + T s) once, twice and so on: exact, stationary from the first step.
+    """White noise of unit intensity through 1 / (1 + T s) once, twice, and so on; stationary from the first step.
 
-    `noise` is standard normal; a row per step, a column per lag.
+    `noise` is standard normal, one row per step and one column per lag; the result has the same shape. Exact.
     """
     lags = lag_chain(T, noise.shape[1], step)
     x = np.asfortranarray(noise @ lags.added.T)
@@ -146,16 +146,16 @@ def _lagged(T: float, step: float, noise: Array) -> Array:
 
 
 class LagChain(NamedTuple):
-    """Equal lags in a row behind white noise, over one step: lower triangular all."""
+    """One step of equal first-order lags in series, driven by white noise. All three are lower triangular."""
 
     transition: Array
-    added: Array  # Cholesky factor of the covariance that the noise adds in the step
-    stationary: Array  # Cholesky factor of the covariance that remains as it is
+    added: Array  # Cholesky factor of the covariance that the noise adds in one step
+    stationary: Array  # Cholesky factor of the stationary covariance
 
 
 @lru_cache(maxsize=64)
 def lag_chain(T: float, order: int, step: float) -> LagChain:
-    """X' = A x + B (white noise of unit intensity), discretised exactly (Van Loan, 1978)."""
+    """The system x' = A x + B (white noise of unit intensity), discretised exactly (Van Loan, 1978). T, step in s."""
     A, B = (np.eye(order, k=-1) - np.eye(order)) / T, np.eye(order, 1) / T
     both = expm(np.block([[-A, B @ B.T], [np.zeros_like(A), A.T]]) * step)
     transition = both[order:, order:].T
@@ -166,7 +166,7 @@ def lag_chain(T: float, order: int, step: float) -> LagChain:
 
 
 def _gradient(velocity: Array, V: float, lag: float, step: float) -> Array:
-    """The velocities' slope along the path through 1 / (1 + lag s): exact for straight lines between steps."""
+    """The gradient of velocities along the path, 1/s, through 1 / (1 + lag s). Exact: they are linear in a step."""
     share = -math.expm1(-step / lag)
     weight = share / (step * V)
     return np.asarray(lfilter([weight, -weight], [1.0, share - 1.0], velocity - velocity[0], axis=0))

@@ -1,4 +1,4 @@
-"""The wind of a flight as it is set."""
+"""The settings of a flight's wind."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,30 +18,30 @@ LOWEST, HIGHEST = 3.048, 304.8  # m, 10 and 1000 ft above ground: where the turb
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gust:
-    """A discrete gust: it swells and dies away as (1 - cos)/2."""
+    """A discrete gust of the shape (1 - cos)/2: it rises and falls back to zero within its interval."""
 
     from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
     to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
-    velocity: Annotated[tuple[_Gusty, _Gusty, _Gusty], About("at its height: the air moves towards north, east, down")]
+    velocity: Annotated[tuple[_Gusty, _Gusty, _Gusty], About("at its peak: the air moves towards north, east, down")]
 
     def at(self, time: Array) -> Array:
-        """The gust at these times, s; (times, 3), m/s."""
+        """The gust at these times, s: shape (len(time), 3), m/s towards north, east, down."""
         share = np.clip((time - self.from_) / (self.to - self.from_), 0.0, 1.0)
         return np.outer(0.5 - 0.5 * np.cos(2.0 * np.pi * share), self.velocity)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wind:
-    """The wind of a flight. A velocity is that of the air: towards."""
+    """The wind of a flight. A velocity is that of the air: the direction is where the air moves to."""
 
     steady: Annotated[
         tuple[MetresPerSecond, MetresPerSecond], About("steady wind: the air moves towards north, east")
     ] = (0.0, 0.0)
     shear: Annotated[
         tuple[MetresPerSecondPerMetre, MetresPerSecondPerMetre],
-        About("what a metre above the start's altitude adds to the steady wind"),
+        About("change of the steady wind per metre above the start's altitude"),
     ] = (0.0, 0.0)
-    gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; where they overlap, they add up")] = ()
+    gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; overlapping ones add up")] = ()
     turbulence: Annotated[Literal["none", "light", "moderate", "severe"], About("MIL-F-8785C, low altitude")] = "none"
     rotation: Annotated[bool, About("the turbulence also turns the air over a 6-DOF aircraft's wing")] = True
 
@@ -55,7 +55,7 @@ class Wind:
         air = Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)
         if self.turbulence == "none":
             return air
-        from harness.world.turbulence import dryden, turbulence  # SciPy is loaded by those who fly in it
+        from harness.world.turbulence import dryden, turbulence  # late: only turbulence needs SciPy
 
         W_x, W_y = self.steady
         model = dryden(self.turbulence, airspeed, altitude)
