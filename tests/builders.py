@@ -5,9 +5,10 @@ import math
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 
 import aircraft
 import harness
+from autopilot.guidance import Guidance, LawStep
 from autopilot.laws import law
 from harness.cli.main import harness as command_line
 from harness.flight import Flight
@@ -32,6 +34,28 @@ EXPERIMENTS = ROOT / "experiments"
 
 FLIGHT = Flight(plant="kinematic", law=law("nftsm", "paper_1"), duration=20.0)  # tests fly replace(FLIGHT, ...)
 SIXDOF = replace(FLIGHT, plant="sixdof")
+
+
+@dataclass(frozen=True)
+class OwnLaw:
+    """A law of a test's own: `make` starts it."""
+
+    make: Callable[[], LawStep]
+    standoff: float = 200.0
+    max_heading_rate: float = math.radians(5.0)
+    command: Literal["heading_rate", "course_rate"] = "heading_rate"
+
+    def start(self) -> LawStep:
+        return self.make()
+
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        return []
+
+
+def turning(rate: float) -> Guidance:
+    """An answer of a law that commands this heading rate, rad/s, and tells nothing else."""
+    return Guidance(rate, 0.0, 0.0, 0.0, 0.0, rate)
+
 
 HERE = Options(workers=0, log="none")  # in the test's own process
 WORKERS = Options(workers=2, log="none")

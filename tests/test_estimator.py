@@ -1,11 +1,9 @@
 """The estimator against closed forms, and in flight."""
 
 import math
-import subprocess
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
+from typing import Literal, get_args
 
 import numpy as np
 import pytest
@@ -13,10 +11,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from autopilot.estimator import Estimator, Measurement, Tracker, initial, linearised, measurement, residual
-from autopilot.guidance import Guidance, LawStep, Observation
+from autopilot.guidance import Guidance, Observation
 from autopilot.laws import law
 from harness.checks import problems
-from harness.flight import Flight, MetricSettings, air_of, plant_of
+from harness.flight import MetricSettings, air_of, plant_of
 from harness.knowledge import Estimation, sensor
 from harness.log import COLUMNS, FlightLog
 from harness.loop import command, observe, simulate
@@ -24,15 +22,12 @@ from harness.plants.plant import Outcome
 from harness.studies.estimator import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
 from harness.world.randomness import stream
 from harness.world.target import Segment, Target, TargetState
+from tests.builders import DOCS, FLIGHT, OwnLaw, python, turning
 
+Knowledge = Literal["known", "unknown"]
 PAPER = Estimator(kind="ekf")
 MOVING = Target(speed=2.0, heading=-0.8, segments=(Segment(from_=2.0, to=20.0, acceleration=0.1, turn_rate=0.05),))
-DOCS = Path(__file__).parent.parent / "docs" / "estimator.md"
-
-
-def flight(plant: str = "kinematic", **settings: object) -> Flight:
-    defaults = {"law": law("nftsm", "paper_1"), "duration": 20.0, "target": MOVING, "estimator": PAPER}
-    return Flight(plant=plant, **{**defaults, **settings})
+EKF = replace(FLIGHT, target=MOVING, estimator=PAPER)
 
 
 def column(x: float, x_dot: float, y: float, y_dot: float) -> np.ndarray:
@@ -72,7 +67,9 @@ def test_the_azimuth_residual_is_the_short_way_round(expected: float, difference
     [((300.0, 200.0), (-1.0, 2.0)), ((-400.0, 60.0), (0.0, -2.0)), ((-50.0, -80.0), (2.0, 1.0))],
     ids=["ahead", "from east to west, south of the sensor", "past the sensor"],
 )
-def test_exact_measurements_of_a_constant_velocity_bring_the_truth(start, velocity) -> None:
+def test_exact_measurements_of_a_constant_velocity_bring_the_truth(
+    start: tuple[float, float], velocity: tuple[float, float]
+) -> None:
     tracker = PAPER.start()
     for k in range(600):
         x, y = (p + v * 0.5 * k for p, v in zip(start, velocity, strict=True))
@@ -147,7 +144,7 @@ def test_a_turn_that_the_model_does_not_know_is_an_error_that_the_filter_does_no
 
 
 def test_the_documents_table_is_what_the_command_prints() -> None:
-    lines = DOCS.read_text(encoding="utf-8").splitlines()
+    lines = (DOCS / "estimator.md").read_text(encoding="utf-8").splitlines()
     for case in (cases()[0], cases()[4]):
         assert table_row(case) in lines
 
@@ -167,63 +164,58 @@ def test_a_stream_is_named_by_seed_and_purpose() -> None:
     assert stream(5, "sensor").random() == stream(5, "sensor").random()
 
 
-def seen(log: FlightLog) -> bytes:
+def knowledge(log: FlightLog) -> bytes:
     return log.table[:, COLUMNS.index("target_north_seen") :].tobytes()
 
 
 def test_every_plant_and_law_meets_the_same_noise_and_every_seed_another() -> None:
-    kinematic = simulate(flight())
-    assert seen(simulate(flight("sixdof"))) == seen(kinematic)
-    assert seen(simulate(flight(law=law("smc", direction="mirrored")))) == seen(kinematic)
-    assert simulate(flight()).digest == kinematic.digest
-    other = simulate(flight(seed=1))
+    kinematic = simulate(EKF)
+    assert knowledge(simulate(replace(EKF, plant="sixdof"))) == knowledge(kinematic)
+    assert knowledge(simulate(replace(EKF, law=law("smc", direction="mirrored")))) == knowledge(kinematic)
+    assert simulate(EKF).digest == kinematic.digest
+    other = simulate(replace(EKF, seed=1))
     assert not np.isclose(other["innovation_range"][10::10], kinematic["innovation_range"][10::10]).any()
 
 
-@dataclass(frozen=True)
-class Listening:
-    """A law that commands nothing and keeps what it was told."""
+def listening(heard: list[Observation]) -> OwnLaw:
+    """A law that commands nothing and keeps what it hears."""
 
-    heard: list[Observation]
-    standoff: float = 200.0
-    max_heading_rate: float = 0.1
+    def step(observation: Observation) -> Guidance:
+        heard.append(observation)
+        return turning(0.0)
 
-    def start(self) -> LawStep:
-        def step(observation: Observation) -> Guidance:
-            self.heard.append(observation)
-            return Guidance(0.0, 7.0, 0.0, 0.0, 0.0, 0.0)
-
-        return step
-
-    def broken_conditions(self, speed_ratio: float) -> list[str]:
-        return []
+    return OwnLaw(lambda: step)
 
 
 def test_the_law_sees_the_estimate_and_nothing_else_of_the_target() -> None:
-    listening = Listening([])
-    log = simulate(flight(law=listening))
-    heard = np.array([o[-6:] for o in listening.heard])
+    heard: list[Observation] = []
+    log = simulate(replace(EKF, law=listening(heard)))
+    seen = np.array([o[-6:] for o in heard])
     names = ("target_north", "target_east", "target_velocity_north", "target_velocity_east")
-    assert np.array_equal(heard[:, :4].T, [log[f"{name}_seen"] for name in names])
-    assert not heard[:, 4:].any()
+    assert np.array_equal(seen[:, :4].T, [log[f"{name}_seen"] for name in names])
+    assert not seen[:, 4:].any()
     assert log["target_turn_rate"].any()
-    assert (np.abs(log["target_north"] - heard[:, 0]) > 1e-3).mean() > 0.9
+    assert (np.abs(log["target_north"] - seen[:, 0]) > 1e-3).mean() > 0.9
 
 
-@pytest.mark.parametrize("acceleration", ["known", "unknown"])
-@pytest.mark.parametrize("turn_rate", ["known", "unknown"])
-def test_a_law_told_the_truth_may_be_left_without_acceleration_or_turn_rate(acceleration: str, turn_rate: str) -> None:
-    listening = Listening([])
-    log = simulate(flight(law=listening, estimator=Estimator(acceleration=acceleration, turn_rate=turn_rate)))
+@pytest.mark.parametrize("acceleration", get_args(Knowledge))
+@pytest.mark.parametrize("turn_rate", get_args(Knowledge))
+def test_a_law_told_the_truth_may_be_left_without_acceleration_or_turn_rate(
+    acceleration: Knowledge, turn_rate: Knowledge
+) -> None:
+    heard: list[Observation] = []
+    log = simulate(
+        replace(EKF, law=listening(heard), estimator=Estimator(acceleration=acceleration, turn_rate=turn_rate))
+    )
     for name, known in (("target_acceleration", acceleration), ("target_turn_rate", turn_rate)):
-        heard = np.array([getattr(o, name) for o in listening.heard])
-        assert np.array_equal(heard, log[name] if known == "known" else np.zeros(len(log)))
+        seen = np.array([getattr(o, name) for o in heard])
+        assert np.array_equal(seen, log[name] if known == "known" else np.zeros(len(log)))
         assert log[name].any()
-    assert [o.target_velocity_north for o in listening.heard] == log["target_velocity_north"].tolist()
+    assert [o.target_velocity_north for o in heard] == log["target_velocity_north"].tolist()
 
 
 def test_the_range_error_is_the_true_one_beside_what_the_law_saw() -> None:
-    log = simulate(flight())
+    log = simulate(EKF)
     for suffix, name in (("", "range_error"), ("_seen", "range_error_seen")):
         away = np.hypot(log["north"] - log[f"target_north{suffix}"], log["east"] - log[f"target_east{suffix}"])
         assert log[name] == pytest.approx(away - 200.0, abs=1e-9)
@@ -232,7 +224,7 @@ def test_the_range_error_is_the_true_one_beside_what_the_law_saw() -> None:
 
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
 def test_with_the_truth_the_law_sees_the_target_as_it_is(plant: str) -> None:
-    log = simulate(flight(plant, estimator=Estimator()))
+    log = simulate(replace(EKF, plant=plant, estimator=Estimator()))
     assert log["range_error_seen"].tobytes() == log["range_error"].tobytes()
     for name in ("target_north", "target_east", "target_velocity_north", "target_velocity_east"):
         assert log[f"{name}_seen"].tobytes() == log[name].tobytes()
@@ -243,7 +235,7 @@ def test_with_the_truth_the_law_sees_the_target_as_it_is(plant: str) -> None:
 
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
 def test_a_flight_with_the_truth_is_law_and_plant_alone_to_the_last_bit(plant: str) -> None:
-    one = flight(plant, estimator=Estimator())
+    one = replace(EKF, plant=plant, estimator=Estimator())
     log, step, target = simulate(one), one.law.start(), MOVING.start()
     flying = plant_of(one).start(one.start, air_of(one))
     for k in range(one.periods):
@@ -254,16 +246,16 @@ def test_a_flight_with_the_truth_is_law_and_plant_alone_to_the_last_bit(plant: s
 
 
 def test_innovations_stand_in_the_rows_of_their_measurements() -> None:
-    log = simulate(flight())
+    log = simulate(EKF)
     measured = np.isfinite(log["innovation_azimuth"])
     assert np.flatnonzero(measured).tolist() == list(range(10, 401, 10))  # the first one started the filter
-    given_a_start = simulate(flight(estimator=replace(PAPER, initial_position=(10.0, 10.0))))
+    given_a_start = simulate(replace(EKF, estimator=replace(PAPER, initial_position=(10.0, 10.0))))
     assert np.isfinite(given_a_start["innovation_range"][0])
 
 
 def test_of_several_measurements_in_a_guidance_period_all_count() -> None:
     often = replace(PAPER, period=0.1)
-    log = simulate(flight(estimator=often, guidance_period=0.5))
+    log = simulate(replace(EKF, estimator=often, guidance_period=0.5))
     tracker, measure, at = often.start(), sensor(often, 0), MOVING.start()
     for j in range(200 + 1):
         last = tracker.update(measure(at(j * 0.1)))
@@ -271,9 +263,9 @@ def test_of_several_measurements_in_a_guidance_period_all_count() -> None:
 
 
 def test_a_measurement_period_must_fit_the_guidance_period_and_the_step() -> None:
-    def told(period: float, guidance_period: float, kind: str = "ekf") -> list[str]:
+    def told(period: float, guidance_period: float, kind: Literal["truth", "ekf"] = "ekf") -> list[str]:
         estimator = replace(PAPER, period=period, kind=kind)
-        return [": ".join(p) for p in problems(flight(estimator=estimator, guidance_period=guidance_period))]
+        return [": ".join(p) for p in problems(replace(EKF, estimator=estimator, guidance_period=guidance_period))]
 
     assert told(0.5, 0.05) == told(0.1, 0.5) == told(0.5, 0.5) == told(0.5, 0.2, "truth") == []
     assert told(0.5, 0.2) == [
@@ -283,15 +275,18 @@ def test_a_measurement_period_must_fit_the_guidance_period_and_the_step() -> Non
 
 
 @pytest.mark.parametrize(
-    ("settings", "reason"),
+    ("estimator", "reason"),
     [
-        ({"initial_position": (1.7e308, 1.7e308)}, "the estimator diverged: a number of its estimate is not finite"),
-        ({"range_variance": 1e308}, "the estimator raised"),
+        (
+            replace(PAPER, initial_position=(1.7e308, 1.7e308)),
+            "the estimator diverged: a number of its estimate is not finite",
+        ),
+        (replace(PAPER, range_variance=1e308), "the estimator raised"),
     ],
 )
-def test_a_filter_that_diverges_ends_the_flight_as_invalid(settings, reason: str) -> None:
+def test_a_filter_that_diverges_ends_the_flight_as_invalid(estimator: Estimator, reason: str) -> None:
     with np.errstate(all="ignore"):
-        log = simulate(flight(estimator=replace(PAPER, **settings)))
+        log = simulate(replace(EKF, estimator=estimator))
     assert log.outcome is Outcome.INVALID
     assert log.reason.startswith(reason)
     assert len(log) < 401
@@ -303,13 +298,13 @@ def test_the_target_is_lost_beyond_the_monitoring_range_of_the_truth(north: floa
     believed = replace(PAPER, initial_position=(north, 0.0), initial_position_variance=1e-6)
     near = Target(position=(2.0 if outcome is Outcome.COMPLETED else 2000.0, 0.0))
     log = simulate(
-        flight(estimator=believed, target=near, duration=1.0, metrics=MetricSettings(monitoring_range=1000.0))
+        replace(EKF, estimator=believed, target=near, duration=1.0, metrics=MetricSettings(monitoring_range=1000.0))
     )
     assert log.outcome is outcome
 
 
 def test_what_falls_due_between_two_looks_is_measured_at_its_own_time() -> None:
-    one = flight()
+    one = EKF
     at: Callable[[float], TargetState] = one.target.start()
     each, only_last = Estimation(one, at), Estimation(one, at)
     assert [each.at(k, at(0.05 * k)) for k in range(38)][-1] == only_last.at(37, at(1.85))
@@ -325,4 +320,5 @@ def test_who_knows_the_truth_loads_no_filter() -> None:
         "heavy = {'filterpy', 'scipy', 'jsbsim', 'matplotlib'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=DOCS.parent.parent)
+    done = python(code)
+    assert done.returncode == 0, done.stderr

@@ -2,8 +2,6 @@
 
 import re
 import sqlite3
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +11,7 @@ from harness.runs.matrix import read_matrix
 from harness.runs.run import Options, run
 from harness.runs.store import JOURNAL
 from harness.settings import load_flight, read_settings
+from tests.builders import command, write
 
 FILE = """\
 [flight]
@@ -34,18 +33,6 @@ duration_s = 2.0
 """
 
 
-def written(folder: Path, text: str) -> Path:
-    path = folder / "a.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def command(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "harness", *map(str, words)], capture_output=True, text=True, check=False, timeout=120
-    )
-
-
 def test_a_former_name_makes_the_same_law_and_warns() -> None:
     with pytest.warns(FutureWarning, match='"identified" is now called "fitted"'):
         former = law("nftsm", "identified")
@@ -56,20 +43,23 @@ def test_a_law_that_names_no_gain_set_has_its_declared_default_and_that_converge
     assert law("nftsm") == law("nftsm", "fitted")
     assert law("smc") == law("smc", "paper")
     assert all(kind.default in kind.gain_sets for kind in LAWS.values())
-    assert law("nftsm").broken_conditions(0.0) == []  # type: ignore[attr-defined]
+    assert law("nftsm").broken_conditions(0.0) == []
 
 
 def test_a_file_with_the_former_name_is_read_and_told_its_line(tmp_path: Path) -> None:
-    path = written(tmp_path, FILE)
+    path = write(tmp_path / "a.toml", FILE)
     with pytest.warns(FutureWarning, match=f'^{re.escape(str(path))}:6: flight.law.gains: the gain set "identified"'):
         flight = load_flight(path)
     assert flight.law == law("nftsm")
     with pytest.warns(FutureWarning, match=r"^--set law.gains=identified: flight.law.gains: "):
-        assert load_flight(written(tmp_path, FILE.replace("identified", "paper")), ["law.gains=identified"]) == flight
+        assert (
+            load_flight(write(tmp_path / "a.toml", FILE.replace("identified", "paper")), ["law.gains=identified"])
+            == flight
+        )
 
 
 def test_a_matrix_with_the_former_name_is_read_and_told_its_line(tmp_path: Path) -> None:
-    path = written(tmp_path, MATRIX)
+    path = write(tmp_path / "a.toml", MATRIX)
     with pytest.warns(FutureWarning, match=f"^{re.escape(str(path))}:7: matrix"):
         matrix = read_matrix(read_settings(path))
     assert [matrix.flight(c).law for c in matrix.combinations()] == [law("nftsm", "paper_1"), law("nftsm", "fitted")]
@@ -77,7 +67,7 @@ def test_a_matrix_with_the_former_name_is_read_and_told_its_line(tmp_path: Path)
 
 def test_a_row_of_an_old_journal_is_flown_again_to_the_last_bit(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    today = written(tmp_path, FILE.replace("identified", "fitted"))
+    today = write(tmp_path / "a.toml", FILE.replace("identified", "fitted"))
     list(run(read_matrix(read_settings(today)), out, Options(workers=0, log="none")))
     with sqlite3.connect(out / JOURNAL) as journal:
         journal.execute("UPDATE flights SET settings = replace(settings, '\"fitted\"', '\"identified\"')")
@@ -89,7 +79,7 @@ def test_a_row_of_an_old_journal_is_flown_again_to_the_last_bit(tmp_path: Path) 
 
 
 def test_the_command_line_warns_in_one_line(tmp_path: Path) -> None:
-    path = written(tmp_path, FILE)
+    path = write(tmp_path / "a.toml", FILE)
     done = command("fly", path, "--json")
     assert done.returncode == 0
     warnings = [line for line in done.stderr.splitlines() if line.startswith("warning")]

@@ -1,16 +1,14 @@
 """The predicted limit cycle: against closed forms, against `lagged` and 6-DOF in flight, and at its border."""
 
 import math
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from autopilot.guidance import Guidance, LawStep, Observation
-from harness.cli.predict import predict
+from autopilot.guidance import Guidance, Observation
 from harness.identification.manoeuvres import STEP
+from harness.limit_cycle.observed import fly
 from harness.limit_cycle.prediction import VISIBLE, Loop, boundary, critical_gain, limit_cycle
 from harness.plants.lagged import Lagged
 from harness.plants.response import plain
@@ -20,36 +18,25 @@ from harness.studies.limit_cycle import (
     AMPLITUDE_WITHIN,
     FREQUENCY_WITHIN,
     airframe_of,
-    fly,
     loop_of,
     with_gains,
 )
+from tests.builders import DOCS, EXPERIMENTS, OwnLaw, invoke, turning
 
-DOCUMENT = Path(__file__).parents[1] / "docs" / "limit_cycle.md"
-EXPERIMENT = Path(__file__).parents[1] / "experiments" / "stationary.toml"
+DOCUMENT = DOCS / "limit_cycle.md"
+EXPERIMENT = EXPERIMENTS / "stationary.toml"
 
 
-@dataclass(frozen=True)
-class Proportional:
+def proportional(gain: float) -> OwnLaw:
     """Turns along its circle, against a heading error in proportion, and a little against a range error."""
 
-    gain: float
-    standoff: float = 200.0
-    max_heading_rate: float = math.radians(5.0)
+    def step(o: Observation) -> Guidance:
+        error = math.remainder(o.heading - (math.atan2(o.east, o.north) - 0.5 * math.pi), math.tau)
+        error += 0.002 * (math.hypot(o.north, o.east) - 200.0)
+        wanted, limit = -13.0 / 200.0 - gain * error, math.radians(5.0)
+        return turning(wanted)._replace(heading_rate=max(-limit, min(limit, wanted)))
 
-    def start(self) -> LawStep:
-        def step(o: Observation) -> Guidance:
-            azimuth = math.atan2(o.east, o.north)
-            error = math.remainder(o.heading - (azimuth - 0.5 * math.pi), math.tau)
-            error += 0.002 * (math.hypot(o.north, o.east) - self.standoff)
-            wanted = -13.0 / self.standoff - self.gain * error
-            rate = max(-self.max_heading_rate, min(self.max_heading_rate, wanted))
-            return Guidance(rate, 0.0, 0.0, 0.0, 0.0, wanted)
-
-        return step
-
-    def broken_conditions(self, speed_ratio: float) -> list[str]:
-        return []
+    return OwnLaw(lambda: step)
 
 
 def test_a_held_integrator_oscillates_at_two_over_the_period() -> None:
@@ -65,8 +52,8 @@ def test_the_critical_gain_of_integrator_and_second_order_is_routh_and_hurwitzs(
 def test_the_border_of_a_proportional_law_is_the_critical_gain() -> None:
     response = plain(0.02, 6.0, 0.7)
     gain, _ = critical_gain(response, 0.05)
-    assert limit_cycle(Loop(Proportional(0.97 * gain), response, 13.0, 0.05)) is None
-    beyond = limit_cycle(Loop(Proportional(1.3 * gain), response, 13.0, 0.05))
+    assert limit_cycle(Loop(proportional(0.97 * gain), response, 13.0, 0.05)) is None
+    beyond = limit_cycle(Loop(proportional(1.3 * gain), response, 13.0, 0.05))
     assert beyond is not None
     assert beyond.command > VISIBLE
 
@@ -140,11 +127,11 @@ def test_a_quicker_response_is_the_same_in_scaled_time() -> None:
 
 
 def test_the_command_tells_the_cycle_and_what_would_end_it() -> None:
-    result = CliRunner().invoke(predict, [str(EXPERIMENT)])
+    result = invoke("predict", EXPERIMENT)
     assert result.exit_code == 0, result.output
     for told in ("critical gain", "limit cycle: 0.6", "times as quick", "border for this inner loop: k2 = 2.59,"):
         assert told in result.output
-    calm = CliRunner().invoke(predict, [str(EXPERIMENT), "--set", "law.name=smc", "--set", "law.gains=paper"])
+    calm = invoke("predict", EXPERIMENT, "--set", "law.name=smc", "--set", "law.gains=paper")
     assert "no limit cycle" in calm.output
 
 
@@ -156,6 +143,6 @@ def test_the_command_tells_the_cycle_and_what_would_end_it() -> None:
     ],
 )
 def test_what_cannot_be_predicted_is_one_line(setting: str, said: str) -> None:
-    result = CliRunner().invoke(predict, [str(EXPERIMENT), "--set", setting])
+    result = invoke("predict", EXPERIMENT, "--set", setting)
     assert result.exit_code == 2
     assert said in result.output

@@ -3,6 +3,7 @@
 import resource
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,7 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from autopilot.estimator import Estimator
-from autopilot.laws import law
-from harness.flight import Flight, MetricSettings
+from harness.flight import MetricSettings
 from harness.log import COLUMNS, FlightLog
 from harness.loop import simulate
 from harness.plants.plant import Outcome
@@ -21,27 +21,24 @@ from harness.review.reading import read_logs, read_recording
 from harness.review.recording import write_recording
 from harness.review.viewer import RERUN, quiet
 from harness.world.wind import Wind
+from tests.builders import FLIGHT, SIXDOF
 
 PERIOD_NS = 50_000_000
 
 
-def flight(plant: str, **settings: object) -> Flight:
-    return Flight(plant=plant, law=law("nftsm", "paper_1"), duration=20.0, **settings)
-
-
 @pytest.fixture(scope="module")
 def kinematic() -> FlightLog:
-    return simulate(flight("kinematic"))
+    return simulate(FLIGHT)
 
 
 @pytest.fixture(scope="module")
 def sixdof() -> FlightLog:
-    return simulate(flight("sixdof", wind=Wind(steady=(2.0, -1.0))))
+    return simulate(replace(SIXDOF, wind=Wind(steady=(2.0, -1.0))))
 
 
 @pytest.fixture(scope="module")
 def ekf() -> FlightLog:
-    return simulate(flight("kinematic", estimator=Estimator(kind="ekf")))
+    return simulate(replace(FLIGHT, estimator=Estimator(kind="ekf")))
 
 
 def chunks(path: Path, entities: str = "/**") -> list[Chunk]:
@@ -49,7 +46,7 @@ def chunks(path: Path, entities: str = "/**") -> list[Chunk]:
 
 
 def stamps(chunk: Chunk) -> list[int]:
-    return chunk.to_record_batch().column("sim_time").cast(pa.int64()).to_pylist()
+    return list(chunk.to_record_batch().column("sim_time").cast(pa.int64()).to_pylist())
 
 
 def entities(path: Path) -> set[str]:
@@ -184,7 +181,7 @@ def test_more_flights_than_colours_are_refused(kinematic: FlightLog, tmp_path: P
 
 
 def test_an_early_end_is_told_with_its_reason(tmp_path: Path) -> None:
-    log = simulate(flight("kinematic", metrics=MetricSettings(monitoring_range=283.0)))
+    log = simulate(replace(FLIGHT, metrics=MetricSettings(monitoring_range=283.0)))
     assert log.outcome is Outcome.TARGET_LOST
     for rows in (len(log), 1, 0):
         ended = FlightLog(log.flight, log.outcome, log.reason, log.table[:rows])

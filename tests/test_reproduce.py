@@ -17,6 +17,7 @@ from harness.studies.paper.reproduce import (
     VARIANTS,
     Number,
     Reproduced,
+    Value,
     moved,
     reproduced,
     shown,
@@ -29,7 +30,7 @@ TABLE_3 = [number for number in NUMBERS if number.where == "Table 3" and number.
 AS_PRINTED = [number for number in NUMBERS if number.law == "NFTSM as printed"]
 
 
-def ours(number: Number) -> object:
+def ours(number: Number) -> Value:
     return under(number, EXPERIMENTS[number.experiment].reading)
 
 
@@ -85,11 +86,14 @@ def test_a_target_without_manoeuvres_makes_all_knowledge_of_them_the_same_flight
 def test_restricted_settled_and_delay_are_read_off_a_flight() -> None:
     one = replace(flight("30", "NFTSM"), guidance_period=0.05, step=0.005)
     log = flown(one)
-    begin, end = restricted(log)
+    span = restricted(log)
+    assert span is not None
+    begin, end = span
     inside = (log["time"] >= begin) & (log["time"] < end)
     assert (np.abs(log["unlimited_command"][inside]) > one.law.max_heading_rate).all()
     assert abs(log["unlimited_command"][~inside & (log["time"] >= end)][0]) <= one.law.max_heading_rate
     time = settled(log, 0.01)
+    assert time is not None
     assert (np.abs(log["range_error"][log["time"] >= time]) < 0.01).all()
     assert settled(log, 0.01, until=time) is None
     assert delay(log, log) is None  # over before 350 s

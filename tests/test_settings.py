@@ -2,8 +2,7 @@
 
 import json
 import math
-import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.laws import LAWS, law
+from autopilot.smc import Smc
 from harness.feasibility import feasibility_margin, warnings
 from harness.flight import Flight
 from harness.plants.plant import Start
@@ -24,13 +24,17 @@ from harness.settings import (
     read_settings,
 )
 from harness.world.target import Segment
+from tests.builders import EXPERIMENTS, python
 
-STATIONARY = Path(__file__).parent.parent / "experiments" / "stationary.toml"
+STATIONARY = EXPERIMENTS / "stationary.toml"
 SHORTEST = '[flight]\nplant = "kinematic"\n[flight.law]\nname = "nftsm"\n'
 
 
+Write = Callable[[str | bytes], Path]
+
+
 @pytest.fixture
-def write(tmp_path, monkeypatch):
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
     """Writes `a.toml` in the working folder."""
     monkeypatch.chdir(tmp_path)
 
@@ -61,11 +65,11 @@ def test_the_stationary_experiment_shows_every_key_that_a_file_may_set() -> None
     assert [key for table in tables for key in table if key not in gains and key not in text] == []
 
 
-def test_what_a_file_leaves_out_has_the_dataclass_default(write) -> None:
+def test_what_a_file_leaves_out_has_the_dataclass_default(write: Write) -> None:
     assert load_flight(write(SHORTEST)) == Flight(plant="kinematic", law=law("nftsm"))
 
 
-def test_degrees_become_radians_and_only_there(write) -> None:
+def test_degrees_become_radians_and_only_there(write: Write) -> None:
     text = SHORTEST + "max_heading_rate_deg_s = 10\n[flight.start]\nheading_deg = -90\nposition_m = [1, 2.5]\n"
     flight = load_flight(
         write(text + "[flight.target]\nsegments = [{ from_s = 1, to_s = 2, turn_rate_deg_s = 180 }]\n")
@@ -75,7 +79,7 @@ def test_degrees_become_radians_and_only_there(write) -> None:
     assert flight.target.segments == (Segment(from_=1.0, to=2.0, turn_rate=math.pi),)
 
 
-def test_single_gains_override_the_named_set(write) -> None:
+def test_single_gains_override_the_named_set(write: Write) -> None:
     flight = load_flight(write(SHORTEST + 'gains = "paper_1"\nbeta2 = 1\n'))
     assert flight.law == law("nftsm", "paper_1", beta2=1.0)
 
@@ -113,21 +117,21 @@ def test_a_heading_is_written_as_it_was_typed(hundredths: int) -> None:
 
 
 def test_a_flight_made_in_python_needs_no_named_set() -> None:
-    value = type(law("smc"))(c1=0.1, c2=0.2, c3=0.3, epsilon=0.4)
+    value = Smc(c1=0.1, c2=0.2, c3=0.3, epsilon=0.4)
     flight = Flight(plant="kinematic", law=value)
     assert document(flight)["law"]["gains"] == "custom"
     assert flight_from_document(document(flight)) == flight
 
 
 @pytest.mark.parametrize("infinite", ["inf", '"inf"'])
-def test_the_heading_rate_limit_may_be_infinite(write, infinite: str) -> None:
+def test_the_heading_rate_limit_may_be_infinite(write: Write, infinite: str) -> None:
     flight = load_flight(write(f"{SHORTEST}max_heading_rate_deg_s = {infinite}\n"))
     assert flight.law.max_heading_rate == math.inf
     assert document(flight)["law"]["max_heading_rate_deg_s"] == "inf"
     assert flight_from_document(document(flight)) == flight
 
 
-def test_an_unknown_key_names_its_line_and_the_nearest_key(write) -> None:
+def test_an_unknown_key_names_its_line_and_the_nearest_key(write: Write) -> None:
     (line,) = mistakes(write(f"{SHORTEST}standoff = 200.0\n"))
     assert line.startswith("a.toml:5: flight.law.standoff: unknown key, known here: airspeed, alpha2, ")
     assert line.endswith(" - did you mean 'standoff_m'?")
@@ -148,12 +152,12 @@ def test_an_unknown_key_names_its_line_and_the_nearest_key(write) -> None:
         ("beta2 = 101", "beta2: is 101, must be a number > 0 and <= 100"),
     ],
 )
-def test_a_wrong_value_is_told_with_what_is_allowed(write, law_line: str, wrong: str) -> None:
+def test_a_wrong_value_is_told_with_what_is_allowed(write: Write, law_line: str, wrong: str) -> None:
     (line,) = mistakes(write(f"{SHORTEST}\n{law_line}\n"))
     assert line.startswith(f"a.toml:6: flight.law.{wrong}")
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(write) -> None:
+def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(write: Write) -> None:
     text = """titel = "x"
 [flight]
 duration_s = "long"
@@ -184,7 +188,7 @@ rate_trim = 1
     ]
 
 
-def test_what_is_impossible_together_is_told_at_the_key_of_the_file(write) -> None:
+def test_what_is_impossible_together_is_told_at_the_key_of_the_file(write: Write) -> None:
     text = (
         f"{SHORTEST}[flight.wind]\nsteady_mps = [13, 1]\n[flight.target]\nsegments = [\n{{ from_s = 5, to_s = 3 }}]\n"
     )
@@ -193,7 +197,7 @@ def test_what_is_impossible_together_is_told_at_the_key_of_the_file(write) -> No
     assert segment.startswith("a.toml:9: flight.target.segments.0.to_s: 3 s")
 
 
-def test_a_mistake_in_an_override_is_told_as_it_was_typed(write) -> None:
+def test_a_mistake_in_an_override_is_told_as_it_was_typed(write: Write) -> None:
     path = write(f"{SHORTEST}alpha2 = -1\n")
     assert mistakes(path, "start.heading_deg=north", "law.alpha2=-2") == [
         "--set law.alpha2=-2: flight.law.alpha2: is -2, must be a number >= 0",
@@ -215,7 +219,7 @@ def test_a_mistake_in_an_override_is_told_as_it_was_typed(write) -> None:
         (f"{SHORTEST}[matrix]\nseed = [1]\n", "a.toml:5: matrix: many flights, not one: use `harness run`"),
     ],
 )
-def test_a_file_that_is_no_flight_is_told_in_one_line(write, text: str | bytes, told: str) -> None:
+def test_a_file_that_is_no_flight_is_told_in_one_line(write: Write, text: str | bytes, told: str) -> None:
     assert mistakes(write(text)) == [told]
 
 
@@ -224,7 +228,7 @@ def test_a_file_that_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
     assert mistakes(tmp_path) == [f"{tmp_path}: Is a directory"]
 
 
-def test_a_field_is_located_by_its_dotted_name(write) -> None:
+def test_a_field_is_located_by_its_dotted_name(write: Write) -> None:
     file = read_settings(write(f"{SHORTEST}[flight.start]\nairspeed_mps = 3\n"), ["start.altitude_m=1"])
     assert file.locate("start.airspeed") == "a.toml:6: flight.start.airspeed_mps"
     assert file.locate("start.heading") == "a.toml:5: flight.start.heading_deg"
@@ -247,7 +251,7 @@ def test_a_document_without_a_file_is_told_by_its_keys() -> None:
 
 def test_reading_settings_loads_no_simulator() -> None:
     code = "import harness.settings, sys; assert not {'jsbsim', 'pandas', 'rerun', 'scipy'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=STATIONARY.parent.parent)
+    assert python(code).returncode == 0
 
 
 ODD = (

@@ -2,10 +2,7 @@
 
 import json
 import math
-import shutil
-import subprocess
-import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -16,21 +13,17 @@ import aircraft
 from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.laws import law
 from harness.doctor import wind_triangle_error
-from harness.flight import Flight
+from harness.flight import MetricSettings
 from harness.loop import simulate
 from harness.plants.plant import End, Outcome, PlantError, Start
 from harness.plants.sixdof import ModelError, SixDof, load, write
 from harness.world.air import Air
 from harness.world.target import Segment, Target
 from harness.world.wind import Wind
+from tests.builders import FLIGHT, SIXDOF, OwnLaw, command, copied_airframe, turning
 
 STEP = 0.005
 STICK = aircraft.folder("ultra_stick_25e")
-
-
-def flight(**changes: object) -> Flight:
-    base = Flight(plant="sixdof", law=law("nftsm", "paper_1"), duration=20.0)
-    return replace(base, **changes)
 
 
 @pytest.mark.parametrize("name", aircraft.names())
@@ -41,7 +34,7 @@ def test_ground_velocity_is_air_velocity_plus_wind(name: str) -> None:
 
 
 def test_position_is_the_integral_of_ground_velocity() -> None:
-    log = simulate(flight(wind=Wind(steady=(2.0, -4.0)), guidance_period=0.005))
+    log = simulate(replace(SIXDOF, wind=Wind(steady=(2.0, -4.0)), guidance_period=0.005))
     for place, speed in (("north", "velocity_north"), ("east", "velocity_east")):
         v = log[speed]
         travelled = 0.005 * (v.sum() - 0.5 * (v[0] + v[-1]))
@@ -60,19 +53,20 @@ def test_the_wind_a_flight_meets_is_the_one_it_is_given() -> None:
 def test_flown_twice_in_two_processes_it_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
     file = tmp_path / "flight.toml"
     file.write_text('[flight]\nplant = "sixdof"\nduration_s = 20.0\n[flight.law]\nname = "smc"\n', encoding="utf-8")
-    command = [sys.executable, "-m", "harness", "fly", str(file), "--json"]
-    answers = [json.loads(subprocess.run(command, check=True, capture_output=True).stdout) for _ in range(2)]
+    answers = [json.loads(command("fly", file, "--json").stdout) for _ in range(2)]
     assert answers[0] == answers[1]
-    here = simulate(flight(law=law("smc")))
+    here = simulate(replace(SIXDOF, law=law("smc")))
     assert here.digest == answers[0]["digest"]
-    assert simulate(flight(law=law("smc"))).digest == here.digest
+    assert simulate(replace(SIXDOF, law=law("smc"))).digest == here.digest
 
 
 @pytest.mark.parametrize(("plant", "tolerance"), [("kinematic", 1e-9), ("sixdof", 1e-3)])
 def test_a_mirrored_flight_mirrors_the_flight(plant: str, tolerance: float) -> None:
     """To rounding on the kinematic plant; in JSBSim rounding grows in the limit cycle, to 1 mm in 30 s."""
-    one = flight(
+    one = replace(
+        SIXDOF,
         plant=plant,
+        law=law("nftsm", "paper_1"),
         duration=30.0,
         wind=Wind(steady=(1.0, 2.0)),
         target=Target(
@@ -82,7 +76,7 @@ def test_a_mirrored_flight_mirrors_the_flight(plant: str, tolerance: float) -> N
     )
     other = replace(
         one,
-        law=replace(one.law, direction="mirrored"),
+        law=law("nftsm", "paper_1", direction="mirrored"),
         wind=Wind(steady=(1.0, -2.0)),
         target=Target(
             position=(10.0, -20.0), speed=1.0, heading=-0.5, segments=(Segment(from_=2.0, to=20.0, turn_rate=-0.05),)
@@ -133,25 +127,17 @@ def test_a_stall_that_lasts_ends_as_departed() -> None:
     assert end.value.outcome is Outcome.DEPARTED
 
 
-@dataclass(frozen=True)
-class Faulty:
-    """A law that is right 20 times."""
+def faulty(answer: float | None) -> LawStep:
+    """A law in flight that is right 20 times, then commands `answer`; None: it raises."""
+    calls = count()
 
-    answer: float | None  # None: it raises
-    standoff: float = 200.0
-    max_heading_rate: float = 0.1
-    command: str = "heading_rate"
+    def step(_: Observation) -> Guidance:
+        rate = 0.0 if next(calls) < 20 else answer
+        if rate is None:
+            raise ZeroDivisionError("of its own")
+        return turning(rate)
 
-    def start(self) -> LawStep:
-        calls = count()
-
-        def step(o: Observation) -> Guidance:
-            right = next(calls) < 20
-            if not right and self.answer is None:
-                raise ZeroDivisionError("of its own")
-            return Guidance(0.0 if right else self.answer, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-        return step
+    return step
 
 
 @pytest.mark.parametrize(
@@ -159,14 +145,14 @@ class Faulty:
     [(None, "the law raised ZeroDivisionError: of its own"), (math.nan, "the law commanded nan")],
 )
 def test_a_law_at_fault_ends_as_invalid_with_what_was_flown_until_then(answer: float | None, reason: str) -> None:
-    log = simulate(flight(plant="kinematic", law=Faulty(answer)))
+    log = simulate(replace(FLIGHT, law=OwnLaw(lambda: faulty(answer))))
     assert (log.outcome, log.reason) == (Outcome.INVALID, reason)
     assert log.outcome.failed
     assert len(log) == 20
 
 
 def test_a_log_ends_where_the_flight_ended() -> None:
-    far = flight(target=Target(position=(10.0, 900.0)), metrics=replace(flight().metrics, monitoring_range=740.0))
+    far = replace(SIXDOF, target=Target(position=(10.0, 900.0)), metrics=MetricSettings(monitoring_range=740.0))
     log = simulate(far)
     assert log.outcome is Outcome.TARGET_LOST
     assert len(log) < far.periods
@@ -183,9 +169,8 @@ def test_a_log_ends_where_the_flight_ended() -> None:
     ],
 )
 def test_a_model_that_jsbsim_cannot_read_whole_is_refused(tmp_path: Path, broken: str, with_: str) -> None:
-    airframe = tmp_path / "broken"
-    shutil.copytree(STICK, airframe)
-    text = (airframe / "ultra_stick_25e.xml").read_text(encoding="utf-8")
+    airframe = copied_airframe("ultra_stick_25e", tmp_path / "broken")
+    text = (airframe / "broken.xml").read_text(encoding="utf-8")
     assert broken in text
     (airframe / "broken.xml").write_text(text.replace(broken, with_, 1), encoding="utf-8")
     with pytest.raises(ModelError, match=r"broken\.xml"):

@@ -58,8 +58,8 @@ def test_remark_4_corrected_is_the_integral(
     x0: float, alpha2: float, beta2: float, alpha3: float, beta3: float
 ) -> None:
     def integrand(u: float) -> float:  # dx / (alpha2 x^beta2 + alpha3 x^beta3) in u = x^(1-beta3)
-        x = u ** (1.0 / (1.0 - beta3))
-        return 1.0 / ((1.0 - beta3) * (alpha2 * x ** (beta2 - beta3) + alpha3))
+        x = math.pow(u, 1.0 / (1.0 - beta3))
+        return 1.0 / ((1.0 - beta3) * (alpha2 * math.pow(x, beta2 - beta3) + alpha3))
 
     integral, _ = quad(integrand, 0.0, x0 ** (1.0 - beta3), limit=200)
     assert ftsm_time(x0, alpha2, beta2, alpha3, beta3) == pytest.approx(integral, rel=1e-6)

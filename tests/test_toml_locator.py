@@ -4,6 +4,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator
+from typing import Any
 
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -53,7 +54,10 @@ PIECES = (
 )
 
 
-def statements(table: dict, key: Key = (), dotted: str = "") -> Iterator[tuple[Key, str]]:
+Table = dict[str, Any]
+
+
+def statements(table: Table, key: Key = (), dotted: str = "") -> Iterator[tuple[Key, str]]:
     """The keys of a table with the text of each, in the order of a TOML file: values first, then tables."""
     for name, value in table.items():
         if isinstance(value, str):
@@ -74,14 +78,14 @@ def quoted(name: str) -> str:
 
 
 @given(TABLES)
-def test_every_key_that_tomllib_reads_is_found_on_the_line_where_it_was_written(table: dict) -> None:
+def test_every_key_that_tomllib_reads_is_found_on_the_line_where_it_was_written(table: Table) -> None:
     text, written = "", {}
     for key, statement in statements(table):
         written[key] = text.count("\n") + 1 + statement.startswith("\n")
         text += f"{statement}\n"
     document, lines = tomllib.loads(text), key_lines(text)
     for key, line in written.items():
-        value = document
+        value: Any = document
         for step in key:
             value = value[step]
         assert lines[key] == line

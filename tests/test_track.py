@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from autopilot.laws import law
 from harness.checks import problems
@@ -18,14 +19,15 @@ from harness.settings import SettingsError, document, flight_from_document, load
 from harness.world.target import Target
 from harness.world.track import TrackError, load_track
 from harness.world.wind import Wind
+from tests.builders import write
 
+Array = NDArray[np.float64]
 HEADER = "time_s, north_m, east_m"
 
 
-def written(path: Path, times: np.ndarray, north: np.ndarray, east: np.ndarray) -> Path:
+def written(path: Path, times: Array, north: Array, east: Array) -> Path:
     rows = (f"{t!r},{n!r},{e!r}" for t, n, e in zip(times.tolist(), north.tolist(), east.tolist(), strict=True))
-    path.write_text("\n".join([HEADER, *rows, ""]))
-    return path
+    return write(path, "\n".join([HEADER, *rows, ""]))
 
 
 @pytest.fixture
@@ -35,9 +37,8 @@ def circle(tmp_path: Path) -> Path:
     return written(tmp_path / "circle.csv", t, 100.0 * np.cos(0.03 * t), 100.0 * np.sin(0.03 * t))
 
 
-def flight(track: Path, **settings: object) -> Flight:
-    defaults = {"law": law("smc"), "duration": 60.0, "target": Target(track=str(track))}
-    return Flight(plant="kinematic", **{**defaults, **settings})
+def flight(track: Path) -> Flight:
+    return Flight(plant="kinematic", law=law("smc"), duration=60.0, target=Target(track=str(track)))
 
 
 def test_a_track_that_is_a_cubic_in_time_comes_back_exactly(tmp_path: Path) -> None:
@@ -137,7 +138,9 @@ def mistake(path: Path) -> str:
     return str(caught.value)
 
 
-def test_a_relative_path_is_from_the_settings_files_folder(circle: Path, tmp_path: Path, monkeypatch) -> None:
+def test_a_relative_path_is_from_the_settings_files_folder(
+    circle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     file = tmp_path / "a.toml"
@@ -161,7 +164,7 @@ def test_mistakes_in_a_track_are_told_at_its_key(circle: Path, tmp_path: Path) -
 
 
 def test_a_flight_may_not_outlast_its_track(circle: Path) -> None:
-    (problem,) = problems(flight(circle, duration=60.05))
+    (problem,) = problems(replace(flight(circle), duration=60.05))
     assert problem.name == "target.track"
     assert problem.message == f"{circle} ends at 60 s, must last as long as duration_s, 60.05 s"
     assert problems(flight(circle)) == []
@@ -177,8 +180,8 @@ def test_a_track_stands_alone(circle: Path, tmp_path: Path) -> None:
 
 def test_feasibility_and_remark_1_count_the_tracks_speed(circle: Path) -> None:
     assert relative_speed(flight(circle)) == pytest.approx(3.0, rel=1e-3)
-    assert relative_speed(flight(circle, wind=Wind(steady=(0.0, -2.0)))) == pytest.approx(5.0, rel=1e-3)
-    said = warnings(flight(circle, wind=Wind(steady=(10.5, 0.0))))
+    assert relative_speed(replace(flight(circle), wind=Wind(steady=(0.0, -2.0)))) == pytest.approx(5.0, rel=1e-3)
+    said = warnings(replace(flight(circle), wind=Wind(steady=(10.5, 0.0))))
     assert any(text.startswith("Remark 1 asks for v_t + v_w < v_a; here it is 13.5 m/s") for text in said)
 
 

@@ -62,7 +62,7 @@ def test_lengths_and_intensities_are_those_of_the_standard() -> None:
 
 @pytest.mark.parametrize("axis", ["u", "v", "w"])
 def test_a_spectrum_integrates_to_the_variance(axis: str) -> None:
-    variance, _ = quad(lambda omega: SPECTRA[axis](MODERATE, np.array(omega)), 0.0, np.inf)
+    variance, _ = quad(lambda omega: float(SPECTRA[axis](MODERATE, np.array(omega))), 0.0, np.inf)
     assert variance == pytest.approx({"u": MODERATE.sigma_u, "v": MODERATE.sigma_u, "w": MODERATE.sigma_w}[axis] ** 2)
 
 
@@ -100,11 +100,13 @@ def test_the_sampled_process_has_the_spectrum_of_the_specification(axis: str, st
 @lru_cache
 def measured(step: float) -> tuple[Array, dict[str, Array], dict[str, float]]:
     """Frequencies in rad/s, spectra per rad/s by Welch, and variances: the mean of some hours of flight."""
-    seeds, spectra, variances = range(24), {}, {}
+    seeds = range(24)
+    spectra: dict[str, Array] = {}
+    variances: dict[str, float] = {}
     for seed in seeds:
         for axis, values in one(seed, step, 3600.0).items():
             f, per_hertz = welch(values, 1.0 / step, nperseg=round(400.0 / step), detrend=False)
-            spectra[axis] = spectra.get(axis, 0.0) + per_hertz / (2.0 * math.pi) / len(seeds)
+            spectra[axis] = spectra.get(axis, np.zeros(len(f))) + per_hertz / (2.0 * math.pi) / len(seeds)
             variances[axis] = variances.get(axis, 0.0) + float(np.mean(values**2)) / len(seeds)
     return 2.0 * math.pi * f, spectra, variances
 
@@ -118,7 +120,7 @@ def test_realisations_have_the_variance_and_the_spectrum_of_the_specification(ax
         inside = (low <= omega) & (omega < high)
         assert spectra[axis][inside].mean() == pytest.approx(expected[inside].mean(), rel=0.1)
     nyquist = math.pi / step
-    variance, _ = quad(lambda w: SPECTRA[axis](MODERATE, np.array(w)), 0.0, nyquist, limit=500)
+    variance, _ = quad(lambda w: float(SPECTRA[axis](MODERATE, np.array(w))), 0.0, nyquist, limit=500)
     assert variances[axis] == pytest.approx(variance, rel=0.1)
 
 
@@ -139,17 +141,18 @@ def test_a_longer_flight_begins_as_a_shorter_one() -> None:
 
 
 @pytest.mark.parametrize(
-    "changes",
+    "flight",
     [
-        {"plant": "kinematic"},
-        {"law": law("nftsm")},
-        {"guidance_period": 0.5},
-        {"aircraft": "skywalker_x8"},
-        {"start": Start(heading=2.0, position=(0.0, 500.0))},
+        replace(FLIGHT, plant="kinematic"),
+        replace(FLIGHT, law=law("nftsm")),
+        replace(FLIGHT, guidance_period=0.5),
+        replace(FLIGHT, aircraft="skywalker_x8"),
+        replace(FLIGHT, start=Start(heading=2.0, position=(0.0, 500.0))),
     ],
+    ids=["plant", "law", "guidance period", "airframe", "start"],
 )
-def test_the_air_is_the_same_whatever_flies_in_it(changes: dict[str, object]) -> None:
-    other = air_of(replace(FLIGHT, **changes))
+def test_the_air_is_the_same_whatever_flies_in_it(flight: Flight) -> None:
+    other = air_of(flight)
     assert np.array_equal(other.gusts, air_of(FLIGHT).gusts)
     assert np.array_equal(other.rotation(SPAN), air_of(FLIGHT).rotation(SPAN))
 
@@ -240,7 +243,8 @@ def test_a_start_above_the_models_range_is_refused() -> None:
 
 def test_jsbsims_own_dryden_filters_have_the_same_spectra() -> None:
     """Independent code: ttTustin of JSBSim, two hours along a north wind (in others it mirrors its axes)."""
-    step, hours, omega = 0.02, [], np.empty(0)
+    step, omega = 0.02, np.empty(0)
+    densities: list[Array] = []
     for seed in range(1, 9):
         fdm = load(aircraft.folder("ultra_stick_25e"), step)
         start = Start(heading=0.0)
@@ -255,8 +259,8 @@ def test_jsbsims_own_dryden_filters_have_the_same_spectra() -> None:
             fdm.run()
             row[:] = [fdm[name] for name in names]
         hertz, density = welch(table[3000:].T, 1.0 / step, nperseg=5000, detrend=False)  # it starts from rest
-        omega, hours = 2.0 * math.pi * hertz, [*hours, density / (2.0 * math.pi)]
-    flown = np.mean(hours, axis=0)
+        omega, densities = 2.0 * math.pi * hertz, [*densities, density / (2.0 * math.pi)]
+    flown = np.mean(densities, axis=0)
     for axis, spectrum, si in zip("uvwq", flown, (FOOT, FOOT, FOOT, 1.0), strict=True):
         for low, high in pairwise((0.5, 1.0, 2.0, 5.0, 10.0)):
             inside = (low <= omega) & (omega < high)

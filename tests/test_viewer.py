@@ -4,8 +4,9 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from rerun.experimental import ViewerClient
@@ -29,7 +30,7 @@ drawing = pytest.mark.skipif(
 TABS = 5
 
 
-def flight(plant: str, gains: str = "paper_1", kind: str = "ekf", duration: float = 20.0) -> Flight:
+def flight(plant: str, gains: str = "paper_1", kind: Literal["truth", "ekf"] = "ekf", duration: float = 20.0) -> Flight:
     gust = Gust(from_=8.0, to=12.0, velocity=(0.0, 3.0, 1.0))
     return Flight(
         plant=plant,
@@ -100,7 +101,7 @@ def test_a_flight_is_in_the_viewer_while_it_is_flown(live: tuple[ViewerClient, i
 
     stream = Live("sixdof", "Live", pace=15.0, port=port)
 
-    def watch(at: float, so_far: object) -> None:
+    def watch(at: float, so_far: Callable[[], FlightLog]) -> None:
         stream(at, so_far)
         if at == 20.0:
             shown_at.append(end_of_data())
