@@ -13,6 +13,7 @@ from harness.margins import Assess
 from harness.settings import SettingsError, load_flight, read_settings, settings_from_text
 from harness.settings.written import written
 from harness.verdict.parts import PARTS
+from tests.builders import DOCS, write
 
 FILE = """\
 [flight]
@@ -26,9 +27,7 @@ range_error_margin_m = 1.0
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    path = tmp_path / "flight.toml"
-    path.write_text(FILE, encoding="utf-8")
-    return path
+    return write(tmp_path / "flight.toml", FILE)
 
 
 def test_margins_come_from_the_file_in_its_units_and_the_rest_by_default(file: Path) -> None:
@@ -44,7 +43,9 @@ def test_a_margin_is_overridden_by_its_key(file: Path) -> None:
 def test_a_part_reads_its_margin_in_the_unit_of_the_file_which_is_that_of_its_metric() -> None:
     part = next(part for part in PARTS if part.threshold == "sideslip_deg")
     assert part.column == "sideslip_rms_deg"
-    assert part.bounds(Assess(sideslip=math.radians(3.0))) == (None, pytest.approx(3.0))
+    low, high = part.bounds(Assess(sideslip=math.radians(3.0)))
+    assert low is None
+    assert high == pytest.approx(3.0)
     assert {part.threshold for part in PARTS} <= set(written(Assess()))
 
 
@@ -64,7 +65,7 @@ BAD = [
 def test_a_bad_margin_is_told_with_its_line_by_whatever_reads_the_file(
     file: Path, good: str, bad: str, told: str
 ) -> None:
-    file.write_text(FILE.replace(good, bad), encoding="utf-8")
+    write(file, FILE.replace(good, bad))
     for read in (load_flight, lambda path: read_settings(path).experiment(), lambda path: read_settings(path).assess()):
         with pytest.raises(SettingsError) as raised:
             read(file)
@@ -81,7 +82,7 @@ def test_every_margin_says_what_it_means_and_where_it_comes_from() -> None:
 
 
 def test_the_document_has_every_margin_with_its_default() -> None:
-    text = (Path(__file__).parent.parent / "docs" / "verdict.md").read_text(encoding="utf-8")
+    text = (DOCS / "reference" / "verdict.md").read_text(encoding="utf-8")
     rows = {row.split("|")[3].strip(" `"): row.split("|")[4] for row in text.splitlines() if row.count("|") == 6}
     for key, default in written(Assess()).items():
         assert key in rows, key

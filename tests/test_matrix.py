@@ -213,7 +213,7 @@ def test_a_file_without_a_matrix_is_one_flight(matrix: Read) -> None:
 
 
 def test_the_documents_matrix_is_right(matrix: Read) -> None:
-    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    text = (DOCS / "guide" / "many_flights.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     m = matrix(example)
     *_, found = survey(m, limit=40)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +23,7 @@ from harness.world.air import Air, Array
 from harness.world.randomness import stream
 from harness.world.turbulence import FOOT, W20, Dryden, _gradient, dryden, lag_chain, turbulence
 from harness.world.wind import Wind
+from tests.builders import DOCS
 
 MODERATE = dryden("moderate", 13.0, 150.0)
 SPAN = 1.27
@@ -285,7 +285,7 @@ def test_an_airframe_survives_moderate_turbulence(name: str, airspeed: float) ->
 
 def test_the_document_has_200_flights_of_each_airframe_in_moderate_turbulence_and_95_percent_survive() -> None:
     """What `make turbulence` flew last; once it found no place for its table and said nothing."""
-    text = (Path(__file__).parent.parent / "docs" / "turbulence.md").read_text(encoding="utf-8")
+    text = (DOCS / "turbulence.md").read_text(encoding="utf-8")
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| moderate | ")]
     assert sorted(row[1].split(",")[0] for row in rows) == ["aerosonde", "skywalker_x8", "ultra_stick_25e"]
     for row in rows:
