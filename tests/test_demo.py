@@ -10,7 +10,7 @@ from harness.review.reading import read_logs, read_recording
 from harness.runs.recordings import recording_path
 from harness.runs.results import load_results
 from harness.tables import number
-from tests.builders import invoke
+from tests.builders import digests, invoke
 
 
 @pytest.fixture(scope="module")
@@ -53,21 +53,22 @@ def test_two_laws_fly_three_cases_on_three_aircraft_to_the_end(flown: pd.DataFra
 def test_the_table_has_a_line_for_each_flight_with_its_metrics(flown: pd.DataFrame, said: str) -> None:
     lines = [line.split() for line in said.splitlines() if " of 1 " in line]
     assert len(lines) == len(flown)
-    for (_, limit, law, airframe, plant), row in flown.iterrows():
+    for row in flown.reset_index().to_dict("records"):
+        plant = row["plant"]
         (line,) = (
             words
             for words in lines
-            if {law, airframe, plant} <= set(words)
-            and f"[{row['wind.steady_mps'][0]:g}," in words
-            and f"{limit:g}" in words[:6]
+            if {row["law.name"], row["aircraft"], plant} <= set(words)
+            and f"[{row['wind']:g}," in words
+            and f"{row['law.max_heading_rate_deg_s']:g}" in words[:6]
         )
         settles = row["convergence_time_s"]
         assert number(None if pd.isna(settles) else settles) in line
         assert line[-1] == ("-" if plant == "kinematic" else number(row["sideslip_peak_deg"]))
 
 
-def test_in_still_air_nftsm_settles_later_on_an_airframe_and_keeps_moving_its_invoke(flown: pd.DataFrame) -> None:
-    still = flown.loc[(0.0, 5.0)]
+def test_in_still_air_nftsm_settles_later_on_an_airframe_and_keeps_moving_its_command(flown: pd.DataFrame) -> None:
+    still = flown.xs((0.0, 5.0))
     settles, activity = still["convergence_time_s"], still["command_activity_deg_s2"]
     for airframe in ("ultra_stick_25e", "skywalker_x8"):
         assert settles["nftsm", airframe, "sixdof"] > settles["nftsm", airframe, "kinematic"] + 10.0
@@ -78,7 +79,7 @@ def test_in_still_air_nftsm_settles_later_on_an_airframe_and_keeps_moving_its_in
 def test_a_circle_that_cannot_be_held_is_warned_of_and_left_on_every_aircraft(flown: pd.DataFrame, out: Path) -> None:
     margin = flown["feasibility_margin_deg_s"]
     assert set(margin.loc[(3.0, 5.0)].round(2)) == {-0.64}
-    assert (flown.loc[(3.0, 5.0)]["range_error_peak_m"] > 20.0).all()
+    assert (flown.xs((3.0, 5.0))["range_error_peak_m"] > 20.0).all()
     assert (margin.loc[(3.0, 8.0)] > 0.0).all()
     again = invoke("demo", "--out", out)
     assert "0 flown, 24 earlier" in again.stdout
@@ -87,9 +88,9 @@ def test_a_circle_that_cannot_be_held_is_warned_of_and_left_on_every_aircraft(fl
 def test_every_flight_is_recorded_and_a_pair_opens_as_the_output_says(
     flown: pd.DataFrame, out: Path, said: str, tmp_path: Path
 ) -> None:
-    for row in flown.itertuples():
-        (log,) = read_logs(recording_path(out, row.key)).values()
-        assert log.digest == row.digest
+    for key, digest in digests(out).items():
+        (log,) = read_logs(recording_path(out, key)).values()
+        assert log.digest == digest
     assert list(read_recording(recording_path(out, flown["key"].iloc[0])).columns) == list(COLUMNS)
     (line,) = (line for line in said.splitlines() if " harness view " in line)
     words = line.partition(" harness ")[2].split()
