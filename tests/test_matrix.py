@@ -199,7 +199,7 @@ def test_the_survey_counts_and_tells_idle_seeds(matrix: Read) -> None:
     text = '[matrix]\nseed = { start = 0, count = 3 }\n"law.max_heading_rate_deg_s" = [1.0, 5.0]\n'
     *_, found = survey(matrix(text))
     assert (found.flights, found.idle_seeds) == (6, 3)
-    (infeasible,) = (number for warning, number in found.warnings.items() if "INFEASIBLE" in warning)
+    (infeasible,) = (number for warning, number in found.warnings.items() if "infeasible" in warning)
     assert infeasible == 3
     assert found.varies == {"seed": 3, "law.max_heading_rate_deg_s": 2}
     *_, noisy = survey(matrix(text, "estimator.kind=ekf"))
