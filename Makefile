@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence verdict bench clean
+.PHONY: demo test install docs models identify paper lock turbulence notebook verdict bench clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -43,6 +43,9 @@ turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (fiv
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
 	$(BIN)/python -m harness.studies.turbulence out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
+
+notebook: install  ## execute docs/guide/notebook.ipynb anew: its outputs are what it says
+	$(BIN)/python docs/execute_notebook.py docs/guide/notebook.ipynb
 
 verdict: install  ## fly the full matrix (22 minutes on two processors), compare, and write docs/results.md
 	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none
