@@ -4,6 +4,7 @@ import inspect
 import json
 import math
 import pkgutil
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -383,3 +384,10 @@ def test_margins_may_be_given() -> None:
     flights = shifted(result_matrix(), "sideslip_rms_deg", 5.0)
     wide = harness.compare(flights, assess=harness.Assess(sideslip=math.radians(20.0))).differences
     assert set(wide.query("metric == 'sideslip_rms_deg'")["verdict"]) == {"holds"}
+
+
+def test_the_docstring_of_a_log_names_every_column() -> None:
+    assert harness.FlightLog.__doc__
+    named = set(re.findall(r"`(\w+)`", harness.FlightLog.__doc__))
+    assert set(COLUMNS) <= named
+    assert named - set(COLUMNS) == {"flight", "outcome", "reason", "table"}
