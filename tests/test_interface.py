@@ -17,6 +17,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import harness
+from harness.key import flight_key
 from harness.log import COLUMNS
 from harness.loop import simulate
 from harness.metric import measure
@@ -146,6 +147,13 @@ def test_a_flight_of_the_interface_is_the_one_of_the_command_line() -> None:
     row = json.loads(done.stdout)
     log = harness.simulate(harness.load_flight(EXPERIMENTS / "stationary.toml", ["plant=kinematic"]))
     assert (log.digest, log.metrics) == (row["digest"], row["metrics"])
+
+
+def test_whole_numbers_and_floats_are_the_same_flight() -> None:
+    whole = replace(FLIGHT, duration=20, start=harness.Start(heading=0, position=(-200, 200)))
+    floats = replace(FLIGHT, duration=20.0, start=harness.Start(heading=0.0, position=(-200.0, 200.0)))
+    assert flight_key(whole) == flight_key(floats)
+    assert harness.simulate(whole).digest == harness.simulate(floats).digest
 
 
 @pytest.mark.parametrize(
