@@ -13,7 +13,6 @@ test: install  ## everything CI checks
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(SITE)
 	$(BIN)/pytest
 
 docs: install  ## the documents as a site, offline, warnings as errors: out/site/index.html

@@ -1,5 +1,6 @@
-"""Writes each airframe's JSBSim model from its data: `python -m aircraft.write_models`."""
+"""Writes an airframe's JSBSim model from its data: `python -m aircraft.write_models [FOLDER...]`, without one all."""
 
+import sys
 import tomllib
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def jsbsim_model(airframe: Path) -> str:
 
 
 if __name__ == "__main__":
-    for name in aircraft.names():
-        airframe = aircraft.FOLDER / name
+    folders = [Path(name).resolve() for name in sys.argv[1:]] or [aircraft.FOLDER / name for name in aircraft.names()]
+    for airframe in folders:
         aircraft.model(airframe).write_text(jsbsim_model(airframe), encoding="utf-8")
-        print(f"wrote {aircraft.model(airframe).relative_to(aircraft.FOLDER.parent)}")
+        print(f"wrote {aircraft.model(airframe)}")

@@ -16,7 +16,8 @@ def test_the_wheel_holds_every_file_of_the_three_packages_and_nothing_else(tmp_p
     command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(tmp_path)]
     subprocess.run(command, check=True, cwd=ROOT, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
-    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    names = zipfile.ZipFile(wheel).namelist()
+    held = {name for name in names if ".dist-info/" not in name}
     sources = {
         path.relative_to(ROOT).as_posix()
         for package in PACKAGES
@@ -24,6 +25,16 @@ def test_the_wheel_holds_every_file_of_the_three_packages_and_nothing_else(tmp_p
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert held == sources
+    assert {name.partition("/licenses/")[2] for name in names if "/licenses/" in name} == {"LICENSE", "NOTICE"}
+
+
+def test_the_notice_names_every_airframe_that_is_shipped() -> None:
+    notice = (ROOT / "NOTICE").read_text(encoding="utf-8")
+    for folder in (path.parent for path in ROOT.glob("aircraft/*/airframe.toml")):
+        assert f"\n{folder.name}\n" in notice
+        sources = tomllib.loads((folder / "airframe.toml").read_text(encoding="utf-8"))["sources"]
+        commits = {commit for text in sources.values() for commit in re.findall(r"\(([0-9a-f]{7}),", text)}
+        assert all(commit in notice for commit in commits), folder.name
 
 
 def test_no_other_distribution_owns_the_names_of_the_packages() -> None:

@@ -1,4 +1,4 @@
-"""A matrix of flights: the product of axes over keys of [flight], expanded one flight at a time, in a fixed order."""
+"""A matrix of flights: axes over any keys of [flight], expanded one flight at a time and always in the same order."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,17 +16,17 @@ from harness.world.randomness import stream
 
 
 class Combination(NamedTuple):
-    """One unchecked flight of a matrix: a value for each key of each axis, in file units."""
+    """One flight of a matrix before it is checked: a value for each key of each axis, in file units."""
 
-    position: int  # in the matrix; excluded combinations count too
+    position: int  # in the matrix, excluded ones counted
     values: Mapping[str, object]
-    lines: Mapping[str, int]  # the line of each value in the file
-    drawn: frozenset[str]  # the keys whose value was drawn from the seed
+    lines: Mapping[str, int]  # where each value stands
+    drawn: frozenset[str]  # the keys whose value is the seed's
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A product of axes; the last one varies fastest."""
+    """A product of axes, the last one fastest."""
 
     axes: Sequence[Axis]
 
@@ -36,7 +36,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """All flights of an experiment's file: the block of [matrix], then one block per [[include]]."""
+    """All flights of an experiment's file: the product of [matrix], then one block per [[include]]."""
 
     file: SettingsFile
     experiment: Experiment
@@ -45,17 +45,17 @@ class Matrix:
 
     @property
     def positions(self) -> int:
-        """The number of combinations; excluded ones count too."""
+        """How many combinations there are, excluded ones counted."""
         return sum(len(block) for block in self.blocks)
 
     @property
     def draws(self) -> list[str]:
-        """The keys that have a value drawn from the seed."""
+        """The keys whose values are drawn from the seed."""
         return list(dict.fromkeys(key for block in self.blocks for a in block.axes for key in a.draws))
 
     @property
     def identifier(self) -> str:
-        """A hash of the matrix: where it is equal, equal positions have equal settings."""
+        """Equal for equal matrices: then equal positions are equal settings."""
         tables = {name: self.file.document.get(name) for name in ("flight", "matrix", "exclude", "include")}
         tables["overrides"] = sorted(".".join(map(str, key)) for key in self.file.overrides)
         return hashed({**_plain(tables), "folder": str(self.file.path.parent.absolute())})
@@ -67,12 +67,11 @@ class Matrix:
         return sum(1 for _ in self.combinations())
 
     def combinations(self) -> Iterator[Combination]:
-        """The combinations that are not excluded, lazily."""
-        candidates = map(self.at, range(self.positions))
-        return (combination for combination in candidates if combination is not None)
+        """All of them, lazily, excluded ones left out."""
+        return (found for position in range(self.positions) if (found := self.at(position)) is not None)
 
     def at(self, position: int) -> Combination | None:
-        """The combination at a position; None where it is excluded."""
+        """The combination at a position; None when it is excluded."""
         place = position
         number = 0
         while place >= len(self.blocks[number]):
@@ -93,16 +92,16 @@ class Matrix:
 
     @property
     def varies(self) -> dict[str, int]:
-        """The number of values of each axis, by its key; keys that vary together are joined by commas."""
-        axes: dict[str, set[object]] = {}
+        """The number of values of each axis, those of one value too; of keys that vary together, by their names."""
+        found: dict[str, set[object]] = {}
         for block in self.blocks:
             for a in block.axes:
                 values = a.values if isinstance(a.values, range) else map(repr, a.values)
-                axes.setdefault(", ".join(a.keys), set()).update(values)
-        return {keys: len(values) for keys, values in axes.items()}
+                found.setdefault(", ".join(a.keys), set()).update(values)
+        return {keys: len(values) for keys, values in found.items()}
 
     def group(self, position: int) -> int:
-        """The number of a group: flights that differ in the plant alone have the same."""
+        """A number that all flights share which differ in the plant alone."""
         place, group = position, 0
         for block in self.blocks:
             if place >= len(block):
@@ -117,14 +116,14 @@ class Matrix:
         raise IndexError(position)
 
     def flight(self, combination: Combination) -> Flight:
-        """The flight of a combination. Raises `SettingsError` with the line of each value that is wrong."""
+        """The flight, checked. Raises `SettingsError` with the lines of the values that make it wrong."""
         try:
             return flight_from_document(self._document(combination)["flight"], self.file.path.parent)
         except SettingsError:
             return self.located(combination).flight()  # raises the same, with its place
 
     def located(self, combination: Combination) -> SettingsFile:
-        """The combination as a settings file of one flight, in which each value has its line in the matrix."""
+        """The combination as a file of one flight, whose values stand where the matrix has them."""
         lines: dict[Key, int] = {("flight", *key.split(".")): line for key, line in combination.lines.items()}
         return replace(self.file, document=self._document(combination), lines={**self.file.lines, **lines})
 
@@ -136,9 +135,9 @@ class Matrix:
 
 
 def read_matrix(file: SettingsFile) -> Matrix:
-    """The matrix of a file; a file without [matrix] gives a matrix of one flight. Raises `SettingsError`.
+    """The matrix of a file; a file without one is a matrix of one flight. Raises `SettingsError`.
 
-    A key that `--set` gives is not an axis: it has that value in every flight.
+    A key given by `--set` is no axis any more: it has that value in every flight.
     """
     experiment = file.experiment()
     mistakes: list[str] = []
@@ -188,7 +187,7 @@ def _exclusion(
     fixed: Sequence[Key],
     mistakes: list[str],
 ) -> Mapping[str, object]:
-    """The values of an exclusion by key; empty if it has a mistake or `--set` gives one of its keys."""
+    """The combinations to leave out; empty when there is a mistake in it, or `--set` fixes a key of it."""
     choices = {key: values for a in block.axes for key, values in a.choices().items()}
     checked = {}
     for key, name, value in flattened(table):
@@ -197,17 +196,17 @@ def _exclusion(
             if _is_fixed(name, fixed):
                 return {}
             known = ", ".join(sorted(choices)) or "none"
-            mistakes.append(f"{place}: is not an axis of [matrix] with listed values, must be one of: {known}")
+            mistakes.append(f"{place}: is no axis of [matrix] with listed values; those are: {known}")
         elif value not in choices[name]:
-            listed = ", ".join(map(str, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
-            mistakes.append(f"{place}: is {value!r}, which excludes nothing, must be one of {listed}")
+            shown = ", ".join(map(str, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
+            mistakes.append(f"{place}: excludes nothing: {value!r} is none of {shown}")
         else:
             checked[name] = value
     return checked
 
 
 def _is_fixed(name: str, fixed: Sequence[Key]) -> bool:
-    """Whether `--set` gives this key or a table that contains it."""
+    """Whether `--set` gives this key, or a table around it."""
     words = tuple(name.split("."))
     return any(words[: len(key)] == key for key in fixed)
 
@@ -217,7 +216,7 @@ def _line(file: SettingsFile, key: Key, element: int | None = None) -> int:
 
 
 def _seed(value: object) -> int:
-    """The seed to draw from; 0 for an invalid one, which the check of the flight reports."""
+    """The seed to draw from; one that is none is told when the flight is checked."""
     return value if isinstance(value, int) and value >= 0 else 0
 
 
@@ -227,7 +226,7 @@ def _table(document: Mapping[str, object], name: str) -> Mapping[str, Any]:
 
 
 def _plain(tables: object) -> Any:
-    """The same tables as JSON can hold them: dates and infinities become text."""
+    """As JSON can hold it: dates and infinities as texts."""
     if isinstance(tables, Mapping):
         return {str(key): _plain(value) for key, value in tables.items()}
     if isinstance(tables, list | tuple):
