@@ -38,8 +38,8 @@ def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
     Raises ValueError for a law, a gain set or a parameter that there is not, with those that there are; FutureWarning
     for the former name of a gain set.
 
-    >>> law("nftsm")
-    >>> law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
+    >>> harness.law("nftsm")
+    >>> harness.law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
     """
     if name not in LAWS:
         raise ValueError(_unknown("law", name, LAWS))

@@ -25,10 +25,19 @@ _NEEDED = ("key", "outcome", "plant", "aircraft", "seed", "duration_s", "law.nam
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What flights say that differ in one setting alone."""
+    """What flights say that differ in one setting alone, `by`.
 
-    answer: str  # in words
-    differences: pd.DataFrame  # see `compare`
+    - `answer`: text: does the assumption hold, what breaks first, what does it cost.
+    - `differences`: one row per metric, value of `by`, aircraft and law, with the columns `metric` (its unit is its
+      suffix), `value`, `aircraft`, `law`, `pairs`, `seeds`, `difference` (mean of the pairs, other minus baseline),
+      `low` and `high` (its 95 % interval over the seeds; NaN without one), `verdict` (holds, fails or undecided where
+      there is a margin; lower, higher or undecided without).
+    - `conditions`: the parts of the assumption that hold under a condition only: `metric`, `value`, `aircraft`,
+      `condition`.
+    """
+
+    answer: str
+    differences: pd.DataFrame
     conditions: pd.DataFrame
 
 
@@ -42,20 +51,11 @@ def compare(
 ) -> Comparison:
     """Pairs the flights that differ in the setting `by` alone, and says how their metrics differ.
 
-    results: a directory of `run`, or a DataFrame as `load_results` gives it.
-    by: the setting, a column of the results; today the plant alone.
-    baseline: its value that the others are compared with; None is the kinematic plant.
-    where: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
-    assess: the margins of the verdict; None: those that the run's settings say, of a DataFrame the defaults.
-
-    The answer has
-    `answer`: text: does the assumption hold, what breaks first, what does it cost;
-    `differences`: one row per metric, value of `by`, aircraft and law: `metric` (unit by suffix), `value`, `aircraft`,
-        `law`, `pairs`, `seeds`, `difference` (mean of the pairs, other minus baseline), `low` and `high` (its 95 %
-        interval, by seeds; NaN without one), `verdict` (holds, fails or undecided where there is a margin; lower,
-        higher or undecided without);
-    `conditions`: `metric`, `value`, `aircraft`, `condition`: under what condition a part of the assumption holds that
-        does not hold throughout.
+    - `results`: a directory of `run`, or a DataFrame as `load_results` gives it.
+    - `by`: the setting, a column of the results; today the plant alone.
+    - `baseline`: its value that the others are compared with; None is the kinematic plant.
+    - `where`: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
+    - `assess`: the margins of the verdict; None: those that the run's settings say, of a DataFrame the defaults.
 
     Raises `CompareError` with what is missing or unknown, and what there is; `StoreError` without results.
 

@@ -33,7 +33,14 @@ class MetricSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flight:
-    """One flight. Defaults are the paper's stationary case (Table 1)."""
+    """One flight: a frozen value of all that decides it. SI, rad. Defaults are the paper's stationary case (Table 1).
+
+    `harness.simulate` flies it and says what is wrong with it. A settings file names the same fields, with units in
+    their keys.
+
+    >>> flight = harness.Flight(plant="sixdof", law=harness.law("nftsm"), duration=150.0)
+    >>> dataclasses.replace(flight, plant="kinematic")
+    """
 
     plant: Annotated[str, OneOf(tuple(PLANTS)), About("everything below the heading-rate command")]
     law: Law

@@ -105,16 +105,16 @@ def run(
     What was flown before is not flown again, so the same call goes on where it was interrupted: finished flights are
     kept, whatever ends it.
 
-    out: the directory of the results, made where there is none.
-    workers: processes; None is one per processor, 0 flies in this process. A script that uses workers must call this
-        under `if __name__ == "__main__":`, as Python's multiprocessing asks; a notebook need not.
-    limit: only the first so many flights of the matrix.
-    log: which flights are recorded in OUT/flights: "all", "sample", "failed" or "none"; None is all up to 50, else a
-        sample.
-    overrides: texts KEY=VALUE that set a key for all flights, as `--set` of the command line does.
-    retry_failed: fly those again that failed.
-    timeout: s of wall time for one flight; None is 20 times its estimate.
-    progress: print how far it is to standard error, once a second.
+    - `out`: the directory of the results, made where there is none.
+    - `workers`: processes; None is one per processor, 0 flies in this process. A script that uses workers must call
+      this under `if __name__ == "__main__":`, as Python's multiprocessing asks; a notebook need not.
+    - `limit`: only the first so many flights of the matrix.
+    - `log`: which flights are recorded in OUT/flights: "all", "sample", "failed" or "none"; None is all of up to 50,
+      else a sample.
+    - `overrides`: texts KEY=VALUE that set a key for all flights, as `--set` of the command line does.
+    - `retry_failed`: fly those again that failed.
+    - `timeout`: s of wall time for one flight; None is 20 times its estimate.
+    - `progress`: print how far it is to standard error, once a second.
 
     Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
     used; `WorkersError` when the processes cannot fly. A flight that fails is a row, not an error.

@@ -44,7 +44,37 @@ _ROWS_AT_ONCE = 128
 
 @dataclass(frozen=True, slots=True)
 class FlightLog:
-    """A flight and what happened, one row per guidance period. SI, rad; `log["range_error"]` is a column."""
+    """A flight and what happened, one row per guidance period: `len(log)` rows, also of a flight that ended early.
+
+    `flight` is what was flown, `outcome` how it ended and `reason` why, if early; `table` is the log, of shape
+    (rows, columns). `log["range_error"]` is a column, of shape (rows,). SI, rad, north-east-down from the flight's
+    origin, headings clockwise from north; NaN where the plant has no such thing. The columns:
+
+    - `time`: s since the start.
+    - `north`, `east`, `velocity_north`, `velocity_east`, `velocity_down`: the aircraft, over the ground; `altitude`
+      above it.
+    - `airspeed`; `heading`: psi_a, the direction of the air velocity, not the nose; `heading_rate`.
+    - `bank`, `pitch`, `yaw`, where `yaw` is the nose; `roll_rate`, `pitch_rate`, `yaw_rate` about the body's axes;
+      `bank_command` of the inner loop.
+    - `angle_of_attack`; `sideslip`, positive with the wind from the right; `lateral_acceleration`: specific force along
+      the body's y axis, m/s^2, zero in a coordinated turn; `load_factor`.
+    - `aileron` (positive rolls right), `elevator` (positive pitches down), `rudder` (positive yaws left), `throttle`
+      (0 to 1).
+    - `wind_north`, `wind_east`, `wind_down`: velocity of the air at the aircraft, gusts included.
+    - `target_north`, `target_east`, `target_velocity_north`, `target_velocity_east`, `target_acceleration` (rate of its
+      speed), `target_turn_rate`: the target in truth.
+    - `heading_rate_command`: what the law commands, limited; `unlimited_command`: the same without the limit;
+      `feed_forward`: its part that no error makes.
+    - `range_error`: distance to the target minus the standoff distance; `range_error_seen`: the same as the law knows
+      it; `sliding_variable`, `heading_error`: the law's own, rad.
+    - `target_north_seen`, `target_east_seen`, `target_velocity_north_seen`, `target_velocity_east_seen`: the target as
+      the law knows it; `target_north_variance`, `target_east_variance`, `target_velocity_north_variance`,
+      `target_velocity_east_variance`: of the estimate; `innovation_range`, `innovation_azimuth`: of the latest
+      measurement since the row before, NaN without one.
+
+    >>> log = harness.simulate(flight)
+    >>> log["range_error"][-1], log.metrics["convergence_time_s"]
+    """
 
     flight: Flight
     outcome: Outcome
@@ -62,7 +92,7 @@ class FlightLog:
 
     @property
     def digest(self) -> str:
-        """A hash of `TRAJECTORY` to the last bit, and of the outcome. Processors have SHA-256 built in."""
+        """32 hex digits: a hash of the trajectory to the last bit, and of the outcome. Equal digests, equal flights."""
         content = hashlib.sha256(repr((TRAJECTORY, self.outcome.value)).encode())
         for begin in range(0, len(self.table), _ROWS_AT_ONCE):  # so few that they stay in the processor's cache
             rows = self.table[begin : begin + _ROWS_AT_ONCE, _TRAJECTORY]
@@ -79,7 +109,10 @@ class FlightLog:
         return measure(self)
 
     def frame(self) -> "pd.DataFrame":
-        """The log as a pandas DataFrame: a row per guidance period, a column per name of `COLUMNS`. SI, rad, NED."""
+        """A copy of the log as a pandas DataFrame, with the same rows, columns and units.
+
+        >>> log.frame().plot(x="time", y="range_error")
+        """
         import pandas as pd
 
         return pd.DataFrame(self.table, columns=COLUMNS, copy=True)

@@ -217,7 +217,7 @@ def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:
         until(lambda: runs_of(tmp_path / "out"), first)
         second = command(*words(file, tmp_path / "out"))
         assert second.returncode == 2
-        assert "another run writes there" in second.stderr.splitlines()[-1]
+        assert "another run writes to it" in second.stderr.splitlines()[-1]
         assert str(first.pid) in second.stderr
     finally:
         first.send_signal(signal.SIGINT)

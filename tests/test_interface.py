@@ -4,6 +4,7 @@ import inspect
 import json
 import math
 import pkgutil
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +17,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import harness
+from harness.key import flight_key
 from harness.log import COLUMNS
 from harness.loop import simulate
 from harness.metric import measure
@@ -145,6 +147,13 @@ def test_a_flight_of_the_interface_is_the_one_of_the_command_line() -> None:
     row = json.loads(done.stdout)
     log = harness.simulate(harness.load_flight(EXPERIMENTS / "stationary.toml", ["plant=kinematic"]))
     assert (log.digest, log.metrics) == (row["digest"], row["metrics"])
+
+
+def test_whole_numbers_and_floats_are_the_same_flight() -> None:
+    whole = replace(FLIGHT, duration=20, start=harness.Start(heading=0, position=(-200, 200)))
+    floats = replace(FLIGHT, duration=20.0, start=harness.Start(heading=0.0, position=(-200.0, 200.0)))
+    assert flight_key(whole) == flight_key(floats)
+    assert harness.simulate(whole).digest == harness.simulate(floats).digest
 
 
 @pytest.mark.parametrize(
@@ -383,3 +392,10 @@ def test_margins_may_be_given() -> None:
     flights = shifted(result_matrix(), "sideslip_rms_deg", 5.0)
     wide = harness.compare(flights, assess=harness.Assess(sideslip=math.radians(20.0))).differences
     assert set(wide.query("metric == 'sideslip_rms_deg'")["verdict"]) == {"holds"}
+
+
+def test_the_docstring_of_a_log_names_every_column() -> None:
+    assert harness.FlightLog.__doc__
+    named = set(re.findall(r"`(\w+)`", harness.FlightLog.__doc__))
+    assert set(COLUMNS) <= named
+    assert named - set(COLUMNS) == {"flight", "outcome", "reason", "table"}

@@ -163,8 +163,11 @@ MISTAKES = [
         '[matrix]\nseed = [1]\n"seed, plant" = [[1, "sixdof"]]\n',
         "m.toml:9: matrix.seed, plant: seed is an axis already",
     ),
-    ('[matrix]\nseed = [1]\n[[exclude]]\nplant = "sixdof"\n', "m.toml:10: exclude.plant: is no axis of [matrix]"),
-    ("[matrix]\nseed = [1]\n[[exclude]]\nseed = 2\n", "m.toml:10: exclude.seed: excludes nothing: 2 is none of 1"),
+    ('[matrix]\nseed = [1]\n[[exclude]]\nplant = "sixdof"\n', "m.toml:10: exclude.plant: is not an axis of [matrix]"),
+    (
+        "[matrix]\nseed = [1]\n[[exclude]]\nseed = 2\n",
+        "m.toml:10: exclude.seed: is 2, which excludes nothing, must be one of 1",
+    ),
 ]
 
 

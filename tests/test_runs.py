@@ -240,8 +240,8 @@ def test_a_row_of_another_version_is_flown_with_a_warning_that_has_the_largest_d
     assert in_copy(own_copy, *again).endswith("to the last bit")
     law.write_text(law.read_text().replace("c1 * atan(", "1.001 * c1 * atan("))
     told = in_copy(own_copy, *again)
-    assert told.startswith("warning: not the flight that is stored (changed since: autopilot/smc.py): ")
-    assert "at the end is" in told
+    assert told.startswith("warning: differs from the stored flight (changed since: autopilot/smc.py): ")
+    assert "at the end differs by" in told
 
 
 def test_the_store_knows_where_its_rows_come_from(file: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from harness.log import COLUMNS
 from harness.plants.ladder import PLANTS
 from harness.review.reading import read_logs
-from harness.runs.logs import named
+from harness.runs.logs import distinctly_named
 from harness.runs.results import load_results
 from harness.runs.store import JOURNAL
 from tests.builders import HERE, fly_matrix, invoke, write
@@ -67,7 +67,7 @@ def test_six_flights_are_named_by_what_they_differ_in(out: Path, tmp_path: Path)
     again = invoke("view", tmp_path / "six.rrd", "--flight", "sixdof paper", "--save", tmp_path / "one.rrd")
     assert again.exit_code == 0, again.output
     assert read_logs(tmp_path / "one.rrd")["sixdof paper"].digest == logs["sixdof paper"].digest
-    assert list(named([logs["sixdof paper"]] * 2)) == ["sixdof", "sixdof 2"]
+    assert list(distinctly_named([logs["sixdof paper"]] * 2)) == ["sixdof", "sixdof 2"]
 
 
 def test_a_flight_flown_again_that_is_not_the_stored_one_is_said(out: Path, tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_a_flight_flown_again_that_is_not_the_stored_one_is_said(out: Path, tmp_
             journal.execute("UPDATE flights SET digest = ? WHERE key = ?", (digest, key))
         journal.close()
     assert done.exit_code == 0
-    assert f"warning: {key}: not the flight that is stored" in done.stderr
+    assert f"warning: {key}: differs from the stored flight" in done.stderr
 
 
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])

@@ -121,10 +121,7 @@ def _compare(recalled: Recalled, result: FlightResult) -> None:
     if not recalled.digest:
         click.echo(f"the row has no digest to compare with: it ended in {recalled.stored.row['outcome']}", err=True)
     elif apart := deviation(recalled.stored, result):
-        why = (
-            f"changed since: {', '.join(recalled.changed)}" if recalled.changed else "though nothing known has changed"
-        )
-        click.echo(f"warning: not the flight that is stored ({why}): {apart}", err=True)
+        click.echo(f"warning: differs from the stored flight ({recalled.changes}): {apart}", err=True)
     else:
         click.echo("the same flight as stored, to the last bit", err=True)
 

@@ -70,7 +70,7 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
     """The flights asked for, by name; None: all of a recording, as it is."""
     from harness.cli._input import BadInput
     from harness.review.styled import MOST
-    from harness.runs.logs import named, pair_of_row
+    from harness.runs.logs import distinctly_named, pair_of_row
     from harness.runs.recall import row_address
     from harness.runs.store import StoreError
     from harness.settings import SettingsError
@@ -93,8 +93,8 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
         raise BadInput(f"{what}: which flights? Name them with --flight KEY, or one with --pair KEY")
     try:
         if pair is not None:
-            return named(pair_of_row(path, pair, _say))
-        return named(_rows(path, flights))
+            return distinctly_named(pair_of_row(path, pair, _say))
+        return distinctly_named(_rows(path, flights))
     except (StoreError, SettingsError, ValueError) as error:
         raise BadInput(str(error)) from None
 

@@ -1,4 +1,4 @@
-"""An axis of a matrix: the values that a key takes, or keys that vary together; and what is drawn from the seed."""
+"""An axis of a matrix: the values of one key, or of several keys that vary together; values may be random draws."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,16 +14,16 @@ FORMS = (
 DRAWN_FORMS = (
     "{ uniform = [a, b] }, { normal = [mean, deviation] } or { speed_mps = v, towards_deg = { uniform = [a, b] } }"
 )
-_MOST = 10_000_000  # values of an axis
+_MOST_VALUES = 10_000_000  # of an axis
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """The values of one key, or of several that vary together."""
+    """The values of one key, or of several keys that vary together."""
 
     keys: tuple[str, ...]
-    values: Sequence[Any]  # of several keys, each a list with one for each key; what is drawn is a `Draw`
-    lines: Sequence[int]  # where each stands; one for all that stand together
+    values: Sequence[Any]  # with several keys, each is a list of one value per key; a random value is a `Draw`
+    lines: Sequence[int]  # the line of each value in the file; the last one stands for all that follow
 
     def __len__(self) -> int:
         return len(self.values)
@@ -34,12 +34,12 @@ class Axis:
         return zip(self.keys, value if len(self.keys) > 1 else (value,), strict=True)
 
     def line(self, i: int) -> int:
-        """Where the i-th value stands."""
+        """The line of the i-th value in the file."""
         return self.lines[min(i, len(self.lines) - 1)]
 
     @property
     def draws(self) -> list[str]:
-        """The keys with a value that is drawn."""
+        """The keys that have a random value."""
         return [key for key, values in self.choices().items() if any(isinstance(v, Draw) for v in values)]
 
     def choices(self) -> dict[str, Sequence[Any]]:
@@ -49,7 +49,7 @@ class Axis:
         return {key: [value[i] for value in self.values] for i, key in enumerate(self.keys)}
 
     def only(self, keys: Sequence[str]) -> "Axis":
-        """The axis with these of its keys."""
+        """The axis reduced to these of its keys."""
         if len(keys) == len(self.keys):
             return self
         kept = [self.choices()[key] for key in keys]
@@ -58,15 +58,18 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """A value drawn for each seed: uniform between a and b, or normal with mean a and deviation b; of vectors, each."""
+    """A random value, drawn for each seed: uniform between a and b, or normal with mean a and deviation b.
+
+    Where a and b are vectors, each component is drawn on its own.
+    """
 
     kind: str
     a: Any
     b: Any
-    length: float | None = None  # if given, what is drawn is the direction, deg, of a vector of this length
+    length: float | None = None  # if given, the draw is the direction, deg, of a vector of this length
 
     def value(self, noise: np.random.Generator) -> float | list[float]:
-        """The value that this stream of random numbers gives."""
+        """The value drawn from this random stream."""
         a, b = np.asarray(self.a, float), np.asarray(self.b, float)
         drawn = (
             a + (b - a) * noise.random(a.shape) if self.kind == "uniform" else a + b * noise.standard_normal(a.shape)
@@ -82,36 +85,37 @@ class Draw:
 
 
 def flattened(table: Mapping[str, object]) -> Iterator[tuple[tuple[str, ...], str, object]]:
-    """Every entry of a table of axes: its key as it stands in the file, the dotted name, the value.
+    """Every entry of a table of axes as (key in the file, dotted name, value).
 
-    `"law.gains" = [...]` and `law.gains = [...]` are the same.
+    `"law.gains" = [...]` and `law.gains = [...]` have the same dotted name.
     """
     for key, value in table.items():
         if isinstance(value, Mapping) and not _is_form(value):
             for inner_key, name, inner in flattened(value):
-                yield (key, *inner_key), f"{_named(key)}.{name}", inner
+                yield (key, *inner_key), f"{_dotted_name(key)}.{name}", inner
         else:
-            yield (key,), _named(key), value
+            yield (key,), _dotted_name(key), value
 
 
-def _named(key: str) -> str:
+def _dotted_name(key: str) -> str:
     return ", ".join(part.strip().removeprefix("flight.") for part in key.split(","))
 
 
 _FORMS = ({"start", "count"}, {"from", "to", "step"}, {"speed_mps", "towards_deg"}, {"uniform"}, {"normal"})
-_MARKS = set().union(*_FORMS) - {"speed_mps"}  # which is a key of [flight.target] too
+_FORM_KEYS = set().union(*_FORMS) - {"speed_mps"}  # without the one that is also a key of [flight.target]
 
 
 def _is_form(table: Mapping[str, object]) -> bool:
-    """Whether a table describes values, if perhaps mistyped, and is no table of further keys."""
+    """Whether a table describes the values of an axis, perhaps with a mistake, rather than holding further keys."""
     tables = {name for name, value in table.items() if isinstance(value, Mapping)}
-    return not _MARKS.isdisjoint(table) and tables <= {"towards_deg"}
+    return not _FORM_KEYS.isdisjoint(table) and tables <= {"towards_deg"}
 
 
 def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -> Axis:
-    """The axis of an entry. A list is its values, or, without `lists`, one value. ValueError says what is wrong.
+    """The axis of an entry `name = value`. Raises ValueError, without a place, for a mistake in it.
 
-    A form of `DRAWN_FORMS` may stand for any value.
+    With `lists`, a list holds the values of the axis; without, it is one value. Any value may be one of `DRAWN_FORMS`.
+    `line` gives the line in the file of the i-th value.
     """
     keys = tuple(name.split(", "))
     if not all(word for key in keys for word in key.split(".")):
@@ -124,18 +128,18 @@ def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -
         raise ValueError(f"is {value!r}, must be {FORMS}")
     values: list[Any] = value if lists and isinstance(value, list) else [value]
     if not values:
-        raise ValueError("the list is empty: no flight is left")
+        raise ValueError("the list is empty, must have at least one value")
     lines = [line(i) for i in range(len(values))]
     if len(keys) == 1:
-        return Axis(keys, [_element(one) for one in values], lines)
-    for i, one in enumerate(values):
-        if not (isinstance(one, list) and len(one) == len(keys)):
-            raise ValueError(f"element {i + 1} is {one!r}, must be a list of {len(keys)}: {name}")
-    return Axis(keys, [[_element(of_key) for of_key in one] for one in values], lines)
+        return Axis(keys, [_element(element) for element in values], lines)
+    for i, element in enumerate(values):
+        if not (isinstance(element, list) and len(element) == len(keys)):
+            raise ValueError(f"element {i + 1} is {element!r}, must be a list of {len(keys)}: {name}")
+    return Axis(keys, [[_element(of_key) for of_key in element] for element in values], lines)
 
 
 def _element(value: object) -> object:
-    """A value of a list: itself, or what a form draws."""
+    """An element of a list: a plain value as it is, or the `Draw` that a form describes."""
     if not isinstance(value, Mapping) or not _is_form(value):
         return value
     form = _form(value) if set(value) in _FORMS else ()
@@ -145,13 +149,13 @@ def _element(value: object) -> object:
 
 
 def _form(table: Mapping[str, Any]) -> Sequence[Any]:
-    """The values that a table describes."""
+    """The values that a table such as { from, to, step } describes."""
     if set(table) not in _FORMS:
         raise ValueError(f"has the keys {', '.join(sorted(table))}, must be {FORMS}")
     if "start" in table:
-        start, count = (_whole(table, name) for name in ("start", "count"))
-        if not 1 <= count <= _MOST:
-            raise ValueError(f"count is {count}, must be from 1 to {_MOST}")
+        start, count = (_integer(table, name) for name in ("start", "count"))
+        if not 1 <= count <= _MOST_VALUES:
+            raise ValueError(f"count is {count}, must be from 1 to {_MOST_VALUES}")
         return range(start, start + count)
     if "from" in table:
         return _range(table)
@@ -162,24 +166,24 @@ def _form(table: Mapping[str, Any]) -> Sequence[Any]:
 
 def _draw(table: Mapping[str, Any]) -> Draw:
     kind = "uniform" if "uniform" in table else "normal"
-    return Draw(kind, *_two(table, kind))
+    return Draw(kind, *_two_numbers(table, kind))
 
 
 def _vectors(table: Mapping[str, Any]) -> Sequence[Any]:
-    """Of each speed towards each direction, or towards one that is drawn. Still air has no direction."""
-    speeds, ways = _numbers(table, "speed_mps"), table["towards_deg"]
-    if not isinstance(ways, Mapping):
-        ways = _numbers(table, "towards_deg")
-        return [_towards(speed, way) for speed in speeds for way in (ways if speed else ways[:1])]
-    if set(ways) not in ({"uniform"}, {"normal"}) or isinstance((drawn := _draw(ways)).a, list):
+    """A vector for each speed and direction, or one with a random direction for each speed. Still air has one only."""
+    speeds, directions = _numbers(table, "speed_mps"), table["towards_deg"]
+    if not isinstance(directions, Mapping):
+        angles = _numbers(table, "towards_deg")
+        return [_towards(speed, angle) for speed in speeds for angle in (angles if speed else angles[:1])]
+    if set(directions) not in ({"uniform"}, {"normal"}) or isinstance((drawn := _draw(directions)).a, list):
         forms = "{ uniform = [a, b] } or { normal = [mean, deviation] }"
-        raise ValueError(f"towards_deg is {dict(ways)!r}, must be numbers, {forms}")
+        raise ValueError(f"towards_deg is {dict(directions)!r}, must be numbers, {forms}")
     return [replace(drawn, length=speed) if speed else _towards(0.0, 0.0) for speed in speeds]
 
 
-def _towards(length: float, way_deg: float) -> list[float]:
-    """North and east of a vector."""
-    return [round(length * f(math.radians(way_deg)), 12) + 0.0 for f in (math.cos, math.sin)]
+def _towards(length: float, direction_deg: float) -> list[float]:
+    """The components north and east of a vector; direction clockwise from north."""
+    return [round(length * f(math.radians(direction_deg)), 12) + 0.0 for f in (math.cos, math.sin)]
 
 
 def _range(table: Mapping[str, Any]) -> Sequence[float]:
@@ -187,14 +191,14 @@ def _range(table: Mapping[str, Any]) -> Sequence[float]:
     if step == 0.0 or (last - first) / step < 0.0:
         raise ValueError(f"step is {step:g}, must lead from {first:g} to {last:g}")
     count = math.floor((last - first) / step * (1.0 + 1e-12) + 1e-9) + 1
-    if count > _MOST:
-        raise ValueError(f"has {count} values, must be {_MOST} at most")
+    if count > _MOST_VALUES:
+        raise ValueError(f"has {count} values, must be {_MOST_VALUES} at most")
     if all(isinstance(table[name], int) for name in ("from", "to", "step")):
         return [int(first) + i * int(step) for i in range(count)]
     return [float(f"{first + i * step:.12g}") for i in range(count)]
 
 
-def _whole(table: Mapping[str, Any], name: str) -> int:
+def _integer(table: Mapping[str, Any], name: str) -> int:
     value = table[name]
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"{name} is {value!r}, must be a whole number")
@@ -213,17 +217,17 @@ def _numbers(table: Mapping[str, Any], name: str) -> list[float]:
     return [_finite(v, name) for v in values]
 
 
-def _two(table: Mapping[str, Any], kind: str) -> tuple[Any, Any]:
+def _two_numbers(table: Mapping[str, Any], kind: str) -> tuple[Any, Any]:
     """Two numbers, or two vectors of equal length."""
     value = table[kind]
-    wanted = f"{kind} is {value!r}, must be two numbers, or two lists of as many numbers"
+    wrong = f"{kind} is {value!r}, must be two numbers, or two lists of equal length"
     if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(wanted)
+        raise ValueError(wrong)
     a, b = value
     if isinstance(a, list) != isinstance(b, list) or (isinstance(a, list) and (len(a) != len(b) or not a)):
-        raise ValueError(wanted)
-    for one in (*a, *b) if isinstance(a, list) else (a, b):
-        _finite(one, kind)
+        raise ValueError(wrong)
+    for number in (*a, *b) if isinstance(a, list) else (a, b):
+        _finite(number, kind)
     if kind == "normal" and any(deviation < 0 for deviation in (b if isinstance(b, list) else [b])):
         raise ValueError(f"the deviation is {b!r}, must be >= 0")
     return a, b

@@ -1,4 +1,4 @@
-"""Flights chosen for review: from their recordings, or flown again from their rows; with names that tell them apart."""
+"""The logs of flights chosen for review: read from their recordings, or flown again; with distinct names."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,13 +14,14 @@ from harness.settings import SettingsError, document, flight_from_document
 from harness.settings.columns import by_column
 
 Say = Callable[[str], None]
-_MOST_WORDS = 3  # of a name
+_MOST_WORDS = 3  # in the name of a flight
 
 
 def flight_of_row(folder: Path, beginning: str, say: Say) -> FlightLog:
-    """The flight of a row: its recording where that holds what the row says, else flown again and compared.
+    """The log of a row: from its recording if that matches the row's digest, otherwise flown again and compared.
 
-    Raises `StoreError`; ValueError when it cannot start. What is remarkable is said.
+    `beginning` is the beginning of its key. `say` gets one line for each thing that the user should know. Raises
+    `StoreError`, and ValueError when the flight cannot start.
     """
     stored = find(folder, beginning)
     key, digest = stored.row["key"], stored.row["digest"]
@@ -28,26 +29,23 @@ def flight_of_row(folder: Path, beginning: str, say: Say) -> FlightLog:
         (log,) = read_logs(recording_path(folder, key)).values()
         if log.digest == digest:
             return log
-        say(f"{key}: the recording is not of the flight that is stored: flown again")
+        say(f"{key}: the recording does not match the stored row: flown again")
     except FileNotFoundError:
         pass
     except (OSError, ValueError) as error:
         say(f"{key}: its recording cannot be used ({error}): flown again")
     recalled = recall(RowAddress(folder, key))
     if not digest:
-        say(f"{key}: ended in {stored.row['outcome']} without a log; flown again, there is nothing to compare with")
+        say(f"{key}: ended in {stored.row['outcome']} without a log: flown again, with no digest to compare with")
         return simulate(recalled.flight)
     again = fly_again(recalled)
     if again.deviation:
-        why = (
-            f"changed since: {', '.join(recalled.changed)}" if recalled.changed else "though nothing known has changed"
-        )
-        say(f"warning: {key}: not the flight that is stored ({why}): {again.deviation}")
+        say(f"warning: {key}: differs from the stored flight ({recalled.changes}): {again.deviation}")
     return again.log
 
 
 def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
-    """The same flight on each plant, the simplest first; on a plant that the run left out it is flown anew."""
+    """The same flight on every plant, the simplest first; it is flown on a plant that the run left out."""
     stored = find(folder, beginning)
     keys = on_each_plant(folder, stored.row["flight"])
     settings = recall(RowAddress(folder, stored.row["key"])).settings
@@ -56,7 +54,7 @@ def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
         if plant in keys:
             logs.append(flight_of_row(folder, keys[plant], say))
             continue
-        say(f"{plant}: not in {folder}, flown anew")
+        say(f"{plant}: not in {folder}: flown now")
         try:
             logs.append(simulate(flight_from_document({**settings, "plant": plant})))
         except (ValueError, SettingsError) as error:
@@ -64,16 +62,17 @@ def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
     return logs
 
 
-def named(logs: Sequence[FlightLog]) -> dict[str, FlightLog]:
-    """Flights by names made of the settings in which they differ."""
-    several = [by_column(document(log.flight)) for log in logs]
-    keys = list(dict.fromkeys(key for one in several for key in one))
-    differ = [key for key in keys if len({str(one.get(key)) for one in several}) > 1]
-    if "law.gains" in differ or "law.name" in differ:  # which say what the single gains are
+def distinctly_named(logs: Sequence[FlightLog]) -> dict[str, FlightLog]:
+    """The flights by distinct names, made of the settings in which they differ."""
+    all_settings = [by_column(document(log.flight)) for log in logs]
+    keys = list(dict.fromkeys(key for settings in all_settings for key in settings))
+    differ = [key for key in keys if len({str(settings.get(key)) for settings in all_settings}) > 1]
+    if "law.gains" in differ or "law.name" in differ:  # these two determine the single gains
         differ = [key for key in differ if not key.startswith("law.") or key in ("law.name", "law.gains")]
     names: dict[str, FlightLog] = {}
-    for log, one in zip(logs, several, strict=True):
-        name = " ".join(_word(key, one) for key in differ[:_MOST_WORDS] if one.get(key) is not None) or log.flight.plant
+    for log, settings in zip(logs, all_settings, strict=True):
+        words = [_word(key, settings) for key in differ[:_MOST_WORDS] if settings.get(key) is not None]
+        name = " ".join(words) or log.flight.plant
         unique = next(n for i in range(1, len(logs) + 2) if (n := name if i == 1 else f"{name} {i}") not in names)
         names[unique] = log
     return names

@@ -1,4 +1,4 @@
-"""A matrix of flights: axes over any keys of [flight], expanded one flight at a time and always in the same order."""
+"""A matrix of flights: the product of axes over keys of [flight], expanded one flight at a time, in a fixed order."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,17 +16,17 @@ from harness.world.randomness import stream
 
 
 class Combination(NamedTuple):
-    """One flight of a matrix before it is checked: a value for each key of each axis, in file units."""
+    """One unchecked flight of a matrix: a value for each key of each axis, in file units."""
 
-    position: int  # in the matrix, excluded ones counted
+    position: int  # in the matrix; excluded combinations count too
     values: Mapping[str, object]
-    lines: Mapping[str, int]  # where each value stands
-    drawn: frozenset[str]  # the keys whose value is the seed's
+    lines: Mapping[str, int]  # the line of each value in the file
+    drawn: frozenset[str]  # the keys whose value was drawn from the seed
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A product of axes, the last one fastest."""
+    """A product of axes; the last one varies fastest."""
 
     axes: Sequence[Axis]
 
@@ -36,7 +36,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """All flights of an experiment's file: the product of [matrix], then one block per [[include]]."""
+    """All flights of an experiment's file: the block of [matrix], then one block per [[include]]."""
 
     file: SettingsFile
     experiment: Experiment
@@ -45,17 +45,17 @@ class Matrix:
 
     @property
     def positions(self) -> int:
-        """How many combinations there are, excluded ones counted."""
+        """The number of combinations; excluded ones count too."""
         return sum(len(block) for block in self.blocks)
 
     @property
     def draws(self) -> list[str]:
-        """The keys whose values are drawn from the seed."""
+        """The keys that have a value drawn from the seed."""
         return list(dict.fromkeys(key for block in self.blocks for a in block.axes for key in a.draws))
 
     @property
     def identifier(self) -> str:
-        """Equal for equal matrices: then equal positions are equal settings."""
+        """A hash of the matrix: where it is equal, equal positions have equal settings."""
         tables = {name: self.file.document.get(name) for name in ("flight", "matrix", "exclude", "include")}
         tables["overrides"] = sorted(".".join(map(str, key)) for key in self.file.overrides)
         return hashed({**_plain(tables), "folder": str(self.file.path.parent.absolute())})
@@ -67,11 +67,12 @@ class Matrix:
         return sum(1 for _ in self.combinations())
 
     def combinations(self) -> Iterator[Combination]:
-        """All of them, lazily, excluded ones left out."""
-        return (found for position in range(self.positions) if (found := self.at(position)) is not None)
+        """The combinations that are not excluded, lazily."""
+        candidates = map(self.at, range(self.positions))
+        return (combination for combination in candidates if combination is not None)
 
     def at(self, position: int) -> Combination | None:
-        """The combination at a position; None when it is excluded."""
+        """The combination at a position; None where it is excluded."""
         place = position
         number = 0
         while place >= len(self.blocks[number]):
@@ -92,16 +93,16 @@ class Matrix:
 
     @property
     def varies(self) -> dict[str, int]:
-        """The number of values of each axis, those of one value too; of keys that vary together, by their names."""
-        found: dict[str, set[object]] = {}
+        """The number of values of each axis, by its key; keys that vary together are joined by commas."""
+        axes: dict[str, set[object]] = {}
         for block in self.blocks:
             for a in block.axes:
                 values = a.values if isinstance(a.values, range) else map(repr, a.values)
-                found.setdefault(", ".join(a.keys), set()).update(values)
-        return {keys: len(values) for keys, values in found.items()}
+                axes.setdefault(", ".join(a.keys), set()).update(values)
+        return {keys: len(values) for keys, values in axes.items()}
 
     def group(self, position: int) -> int:
-        """A number that all flights share which differ in the plant alone."""
+        """The number of a group: flights that differ in the plant alone have the same."""
         place, group = position, 0
         for block in self.blocks:
             if place >= len(block):
@@ -116,14 +117,14 @@ class Matrix:
         raise IndexError(position)
 
     def flight(self, combination: Combination) -> Flight:
-        """The flight, checked. Raises `SettingsError` with the lines of the values that make it wrong."""
+        """The flight of a combination. Raises `SettingsError` with the line of each value that is wrong."""
         try:
             return flight_from_document(self._document(combination)["flight"], self.file.path.parent)
         except SettingsError:
             return self.located(combination).flight()  # raises the same, with its place
 
     def located(self, combination: Combination) -> SettingsFile:
-        """The combination as a file of one flight, whose values stand where the matrix has them."""
+        """The combination as a settings file of one flight, in which each value has its line in the matrix."""
         lines: dict[Key, int] = {("flight", *key.split(".")): line for key, line in combination.lines.items()}
         return replace(self.file, document=self._document(combination), lines={**self.file.lines, **lines})
 
@@ -135,9 +136,9 @@ class Matrix:
 
 
 def read_matrix(file: SettingsFile) -> Matrix:
-    """The matrix of a file; a file without one is a matrix of one flight. Raises `SettingsError`.
+    """The matrix of a file; a file without [matrix] gives a matrix of one flight. Raises `SettingsError`.
 
-    A key given by `--set` is no axis any more: it has that value in every flight.
+    A key that `--set` gives is not an axis: it has that value in every flight.
     """
     experiment = file.experiment()
     mistakes: list[str] = []
@@ -187,7 +188,7 @@ def _exclusion(
     fixed: Sequence[Key],
     mistakes: list[str],
 ) -> Mapping[str, object]:
-    """The combinations to leave out; empty when there is a mistake in it, or `--set` fixes a key of it."""
+    """The values of an exclusion by key; empty if it has a mistake or `--set` gives one of its keys."""
     choices = {key: values for a in block.axes for key, values in a.choices().items()}
     checked = {}
     for key, name, value in flattened(table):
@@ -196,17 +197,17 @@ def _exclusion(
             if _is_fixed(name, fixed):
                 return {}
             known = ", ".join(sorted(choices)) or "none"
-            mistakes.append(f"{place}: is no axis of [matrix] with listed values; those are: {known}")
+            mistakes.append(f"{place}: is not an axis of [matrix] with listed values, must be one of: {known}")
         elif value not in choices[name]:
-            shown = ", ".join(map(str, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
-            mistakes.append(f"{place}: excludes nothing: {value!r} is none of {shown}")
+            listed = ", ".join(map(str, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
+            mistakes.append(f"{place}: is {value!r}, which excludes nothing, must be one of {listed}")
         else:
             checked[name] = value
     return checked
 
 
 def _is_fixed(name: str, fixed: Sequence[Key]) -> bool:
-    """Whether `--set` gives this key, or a table around it."""
+    """Whether `--set` gives this key or a table that contains it."""
     words = tuple(name.split("."))
     return any(words[: len(key)] == key for key in fixed)
 
@@ -216,7 +217,7 @@ def _line(file: SettingsFile, key: Key, element: int | None = None) -> int:
 
 
 def _seed(value: object) -> int:
-    """The seed to draw from; one that is none is told when the flight is checked."""
+    """The seed to draw from; 0 for an invalid one, which the check of the flight reports."""
     return value if isinstance(value, int) and value >= 0 else 0
 
 
@@ -226,7 +227,7 @@ def _table(document: Mapping[str, object], name: str) -> Mapping[str, Any]:
 
 
 def _plain(tables: object) -> Any:
-    """As JSON can hold it: dates and infinities as texts."""
+    """The same tables as JSON can hold them: dates and infinities become text."""
     if isinstance(tables, Mapping):
         return {str(key): _plain(value) for key, value in tables.items()}
     if isinstance(tables, list | tuple):

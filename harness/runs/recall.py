@@ -1,4 +1,4 @@
-"""A row flown again: from what the store holds, although the files that it was flown with may be gone."""
+"""Flying a stored row again, also when the files that it was flown with have changed or are gone."""
 
 import atexit
 import shutil
@@ -26,7 +26,7 @@ class RowAddress(NamedTuple):
 
 
 def row_address(text: str) -> RowAddress | None:
-    """The row that a word of the command line names; None when it names something else."""
+    """The row that an argument of the command line names; None when it names something else."""
     folder, colon, key = text.rpartition(":")
     if not colon or Path(text).exists() or not Path(folder).is_dir():
         return None
@@ -35,25 +35,30 @@ def row_address(text: str) -> RowAddress | None:
 
 @dataclass(frozen=True, slots=True)
 class Recalled:
-    """A row, and its settings as they can be flown now."""
+    """A stored row, and the flight that flies it again now."""
 
     stored: Stored
-    settings: Mapping[str, Any]  # a [flight] table; what is gone or has changed is replaced by unpacked copies
+    settings: Mapping[str, Any]  # a [flight] table; changed or missing files are replaced by stored copies
     flight: Flight
-    changed: tuple[str, ...]  # what is not as it was when the row was flown
+    changed: tuple[str, ...]  # names of everything that has changed since the row was flown
 
     @property
     def digest(self) -> str:
-        """That of the row; empty when it failed without a log."""
+        """The digest of the row; empty when the flight failed without a log."""
         return str(self.stored.row["digest"])
 
+    @property
+    def changes(self) -> str:
+        """What has changed since the row was flown, in words."""
+        return f"changed since: {', '.join(self.changed)}" if self.changed else "although nothing known has changed"
+
     def file(self, name: str, overrides: Sequence[str] = ()) -> SettingsFile:
-        """The row as a settings file of that name, with overrides. Raises `SettingsError`."""
+        """The row as a settings file of this name, with overrides KEY=VALUE. Raises `SettingsError`."""
         return overridden(SettingsFile(Path(name), {"flight": dict(self.settings)}, {}, {}), overrides)
 
 
 def recall(place: RowAddress) -> Recalled:
-    """The row and its flight. Files that are gone or have changed come from the store. Raises `StoreError`."""
+    """The row and its flight; files that changed or are gone are taken from the store. Raises `StoreError`."""
     stored = find(*place)
     settings = without_former_names(stored.row["flight"])  # a copy
     then: Mapping[str, str] = stored.version["content"]
@@ -70,30 +75,30 @@ def recall(place: RowAddress) -> Recalled:
     return Recalled(stored, settings, flight, tuple(changed))
 
 
-class Again(NamedTuple):
-    """A row's flight, flown now."""
+class Reflown(NamedTuple):
+    """The log of a row's flight, flown now."""
 
     log: FlightLog
-    deviation: str  # from the row: the largest, in words; empty when they are equal to the last bit
+    deviation: str  # the largest one from the row, in words; empty when they agree to the last bit
 
 
-def fly_again(recalled: Recalled) -> Again:
-    """Flies the row's flight and compares. ValueError when it cannot start."""
+def fly_again(recalled: Recalled) -> Reflown:
+    """Flies the row's flight and compares it with the row. Raises ValueError when it cannot start."""
     log = simulate(recalled.flight)
-    return Again(log, deviation(recalled.stored, result_of(log)))
+    return Reflown(log, deviation(recalled.stored, result_of(log)))
 
 
 def deviation(stored: Stored, now: FlightResult) -> str:
-    """By how much a flight is not the row's, in words: at its end, and in the metric that differs most."""
+    """How a flight deviates from the row, in words: at its end, and in the metric that differs most; empty if equal."""
     then = stored.row
     if then["digest"] == now.digest:
         return ""
     if then["outcome"] != now.outcome:
-        return f"it was {then['outcome']}, it is {now.outcome}"
-    said = []
+        return f"the outcome was {then['outcome']}, is {now.outcome}"
+    sentences = []
     apart = {name: abs(now.final[name] - x) for name, x in stored.final.items() if name in now.final}
     if largest := max(apart, key=lambda name: apart[name] / (1.0 + abs(stored.final[name])), default=None):
-        said.append(f"{largest} at the end is {apart[largest]:.3g} off (SI)")
+        sentences.append(f"{largest} at the end differs by {apart[largest]:.3g} (SI)")
     moved = {}
     for name, before in then["metrics"].items():
         after = now.metrics.get(name)
@@ -101,31 +106,31 @@ def deviation(stored: Stored, now: FlightResult) -> str:
             moved[name] = (abs(after - before) / (abs(after) + abs(before)), before, after)
     if moved:
         name, (_, before, after) = max(moved.items(), key=lambda item: item[1])
-        said.append(f"{name} was {before:.6g}, is {after:.6g}")
-    return ", ".join(said) or "within the flight, not at its end"
+        sentences.append(f"{name} was {before:.6g}, is {after:.6g}")
+    return ", ".join(sentences) or "during the flight, not at its end"
 
 
 def _airframe(folder: Path, name: str, then: Mapping[str, str]) -> str:
-    """The airframe of the row: by its name while its files are the same, else a folder unpacked from the store."""
+    """The airframe of the row: its name while its files are unchanged, otherwise a folder unpacked from the store."""
     kept = {n.removeprefix("aircraft/"): digest for n, digest in then.items() if n.startswith("aircraft/")}
     try:
         now = aircraft.folder(name)
     except OSError:
         if not kept:
-            return aircraft.names()[0]  # the flight had none
+            return aircraft.names()[0]  # the flight had no airframe: any will do
     else:
         paths = {n: aircraft.model(now) if n == "model" else now / n for n in kept}
         if all(_hash(path) == kept[n] for n, path in paths.items()):
             return name
-    called = Path(name).name
-    return str(_unpacked(folder, {f"{called}.xml" if n == "model" else n: d for n, d in kept.items()}, called))
+    base = Path(name).name
+    return str(_unpacked(folder, {f"{base}.xml" if n == "model" else n: d for n, d in kept.items()}, base))
 
 
-def _unpacked(folder: Path, files: Mapping[str, str], called: str = "files") -> Path:
-    """A temporary folder with these files of the store, until this process ends."""
+def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Path:
+    """A temporary folder named `base` with these files of the store; it is removed when this process ends."""
     temporary = tempfile.mkdtemp(prefix="standoff-harness-")
     atexit.register(shutil.rmtree, temporary, ignore_errors=True)
-    unpacked = Path(temporary) / called
+    unpacked = Path(temporary) / base
     unpacked.mkdir()
     for name, digest in files.items():
         (unpacked / name).write_bytes(content(folder, digest))

@@ -1,4 +1,4 @@
-"""The recording of a flight of a run: DIR/flights/KEY.rrd."""
+"""The recordings of a run's flights: DIR/flights/KEY.rrd."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ FOLDER = "flights"
 
 
 def record(log: FlightLog, key: str, folder: Path) -> str:
-    """Writes it, and says what went wrong; empty when nothing did."""
+    """Writes the recording of a flight. Returns what went wrong in one line, or an empty string."""
     from harness.review.recording import write_recording
 
     path = recording_path(folder, key)
@@ -21,5 +21,5 @@ def record(log: FlightLog, key: str, folder: Path) -> str:
 
 
 def recording_path(folder: Path, key: str) -> Path:
-    """Where it is."""
+    """The path of the recording of the flight with this key."""
     return folder / FOLDER / f"{key}.rrd"

@@ -30,7 +30,11 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     units (lists are tuples, a list of tables is JSON text); every metric by its name, NaN for none (of one that is true
     or false: nullable `boolean`). In the Parquet file the metadata of a column says what it is: `kind` is setting,
     metric or result, and a metric has its `unit` and `meaning`.
-    Raises `harness.runs.store.StoreError`.
+
+    Raises `StoreError` when the directory holds no results, or cannot be read.
+
+    >>> results = harness.load_results("out/wind")
+    >>> results.query("plant == 'sixdof'").groupby("law.name")["range_error_rms_m"].median()
     """
     folder = Path(folder)
     with reading(folder) as journal:

@@ -1,4 +1,4 @@
-"""A flight as a row: what `fly --json` prints and the store keeps, the same for both."""
+"""A flight as one row of results: printed by `fly --json`, kept by the store."""
 
 import math
 from typing import Any, NamedTuple
@@ -17,56 +17,56 @@ FlightRow = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, fea
 
 
 class FlightResult(NamedTuple):
-    """How a flight went; fit for JSON."""
+    """How a flight went; every value is fit for JSON."""
 
     outcome: str
     reason: str
     digest: str
     metrics: dict[str, float | bool | None]
-    final: dict[str, float]  # see `final`
-    seconds: float | None  # wall time of the simulation
+    final: dict[str, float]  # the last row of the log: see `final`
+    seconds: float | None  # wall time of the simulation, s
 
 
 def row_of(log: FlightLog) -> FlightRow:
-    """The row of a flight; fit for JSON, None where there is no number."""
+    """The row of a flown flight, fit for JSON; None for a metric that has no value."""
     return row(log.flight, identity(log.flight), result_of(log))
 
 
-def row(flight: Flight, of: Identity, result: FlightResult) -> FlightRow:
-    """The row of a flight that went so."""
+def row(flight: Flight, identity: Identity, result: FlightResult) -> FlightRow:
+    """The row of a flight with this result."""
     margin = math.degrees(feasibility_margin(flight))
     return {
-        "key": of.key,
+        "key": identity.key,
         "outcome": result.outcome,
         "reason": result.reason,
         "digest": result.digest,
-        "flight": of.settings,
+        "flight": identity.settings,
         "metrics": result.metrics,
-        "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # none without a limit
+        "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # infinite without a heading-rate limit
     }
 
 
 def result_of(log: FlightLog, seconds: float | None = None) -> FlightResult:
-    """How the flight went."""
+    """How a flight went, from its log; `seconds` is the wall time of its simulation."""
     return FlightResult(log.outcome.value, log.reason, log.digest, measure(log), final(log), seconds)
 
 
 def failed_result(outcome: Outcome, reason: str) -> FlightResult:
-    """A flight that left no log."""
+    """The result of a flight that failed without a log."""
     return FlightResult(outcome.value, reason, "", dict.fromkeys(METRICS), {}, None)
 
 
 def simulate_safely(flight: Flight) -> FlightLog:
-    """Flies the flight. What cannot start is an outcome here, `invalid`: one of many must not stop the others."""
+    """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others."""
     try:
         return simulate(flight)
-    except Exception as error:  # of whatever kind: the others have nothing to do with it
+    except Exception as error:  # any kind: the other flights of the run are unaffected
         reason = f"{error.key}: {error}" if isinstance(error, PlantError) else f"{type(error).__name__}: {error}"
         return FlightLog(flight, Outcome.INVALID, f"it cannot start: {reason}", np.empty((0, len(COLUMNS))))
 
 
 def final(log: FlightLog) -> dict[str, float]:
-    """The last row of the log, SI, what is a number of it: enough to see how far a later flight is from this one."""
+    """The finite numbers of the log's last row, by column, SI: they measure how far another flight deviates."""
     if not len(log):
         return {}
     return {name: x for name, x in zip(COLUMNS, log.table[-1].tolist(), strict=True) if math.isfinite(x)}

@@ -1,4 +1,4 @@
-"""A run: the flights of a matrix that are not done yet, flown by workers, kept in a store."""
+"""A run: flies the flights of a matrix that are not done yet and keeps their rows in a store."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -15,41 +15,42 @@ from harness.runs.wall_time import WallTime
 from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
 
-RECORDED = 50  # flights: up to so many all are recorded, of more as many are chosen
+RECORDED = 50  # flights: a run of at most so many records all of them, a larger run a sample of this size
 LOGS = ("all", "sample", "failed", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """How a matrix is flown; nothing here changes a result."""
+    """How a matrix is flown. No option changes a result."""
 
     workers: int
-    limit: int | None = None  # the first so many flights of the matrix
-    log: str | None = None  # one of LOGS; None: all up to `RECORDED`, else a sample
+    limit: int | None = None  # fly only so many flights, the first of the matrix
+    log: str | None = None  # one of LOGS; None: all of up to `RECORDED` flights, otherwise a sample
     retry_failed: bool = False
-    timeout: float | None = None  # s for each flight; None: 20 times its usual wall time
+    timeout: float | None = None  # s per flight; None: 20 times the expected wall time
     fly: Fly = fly_task
 
 
 @dataclass(slots=True)
 class Progress:
-    """How far a run is. Flights."""
+    """The progress of a run. Counts are of flights."""
 
     total: int
     earlier: int = 0  # done by an earlier run
-    done: int = 0  # by this one, failed ones included
+    done: int = 0  # by this run, failed ones included
     failed: int = 0
-    out: int = 0  # with the workers
-    reasons: dict[str, int] = field(default_factory=dict)  # of failures
-    recordings: list[str] = field(default_factory=list)  # what went wrong with them
-    seconds: float = 0.0  # since the first was sent out
-    ahead: float = 0.0  # s of one worker's time, estimated, for what is left
+    out: int = 0  # sent to the workers and not back
+    reasons: dict[str, int] = field(default_factory=dict)  # of failures, with their counts
+    recordings: list[str] = field(default_factory=list)  # what went wrong in writing them
+    seconds: float = 0.0  # since the first flight was sent out
+    ahead: float = 0.0  # estimated time of one worker for the flights left, s
 
 
 def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
-    """Flies what is not done yet, and tells how far it is, a few times a second at least. The flights are valid.
+    """Flies the flights that are not done yet, and yields the progress at least a few times a second.
 
-    Raises `StoreError` and `WorkersError`; whatever ends it, finished flights are kept.
+    The flights of `matrix` have been checked. Finished flights are kept, however the run ends. Raises `StoreError` and
+    `WorkersError`.
     """
     with Store(folder) as store:
         experiment = matrix.experiment
@@ -76,16 +77,14 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         yield progress
 
 
-def _keep(store: Store, done: Done, of: Identity, progress: Progress) -> None:
+def _keep(store: Store, done: Done, identity: Identity, progress: Progress) -> None:
     task, (result, version, problem) = done
     if version != task.version:
-        raise WorkersError(
-            "a law, an airframe or a track has changed while flights were flown: run the same command again"
-        )
+        raise WorkersError("a law, an airframe or a track has changed during the run: run the same command again")
     if problem:
         progress.recordings.append(problem)
-    store.add_version(of.version, files(task.flight))
-    store.add(row(task.flight, of, result), result, version, task.position)
+    store.add_version(identity.version, files(task.flight))
+    store.add(row(task.flight, identity, result), result, version, task.position)
     progress.done += 1
     if Outcome(result.outcome).failed:
         progress.failed += 1
@@ -96,7 +95,7 @@ def _keep(store: Store, done: Done, of: Identity, progress: Progress) -> None:
 def _tasks(
     matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, Identity]
 ) -> Iterator[Task]:
-    """The flights to be flown, lazily."""
+    """The flights that are not done yet, one at a time, each entered in `pending`."""
     number = matrix.identifier
     finished = positions_done(matrix, store.folder, retry_failed=options.retry_failed)
     known = store.keys(failed=not options.retry_failed)
@@ -114,20 +113,20 @@ def _tasks(
             continue
         flights += 1
         flight = matrix.flight(combination)
-        of = identity(flight)
-        store.place(number, position, of.key)
-        if of.key in known:
+        this = identity(flight)
+        store.place(number, position, this.key)
+        if this.key in known:
             progress.earlier += 1
             continue
-        known.add(of.key)
-        pending[of.key] = of
-        yield Task(of.key, position, flight, of.version.number, recorded(position))
+        known.add(this.key)
+        pending[this.key] = this
+        yield Task(this.key, position, flight, this.version.number, recorded(position))
 
 
 def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> frozenset[int]:
-    """The positions of the matrix whose flights are done, by the code and files of now; found without expanding it.
+    """The positions of the matrix whose flights are done with today's code and files.
 
-    Raises `StoreError`.
+    They are read from the store, without expanding the matrix. Raises `StoreError`.
     """
     if not (folder / JOURNAL).exists():
         return frozenset()
@@ -146,9 +145,9 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> froze
 
 
 def _recorded(matrix: Matrix, options: Options, total: int) -> Callable[[int], str]:
-    """When the flight at a position is recorded: all | failed | none.
+    """A function from a position to when its flight is recorded: all | failed | none.
 
-    A sample is whole groups of flights that differ in the plant alone, evenly spread over the matrix.
+    A sample consists of complete groups of flights that differ in the plant alone, evenly spread over the matrix.
     """
     log = options.log or ("all" if total <= RECORDED else "sample")
     if log != "sample":

@@ -1,4 +1,4 @@
-"""The store: one SQLite journal in a run's directory, with one writer."""
+"""The store: one SQLite journal in the directory of a run, with one writer and any number of readers."""
 
 import json
 import os
@@ -18,10 +18,10 @@ from harness.provenance import Provenance, now
 from harness.runs.row import FlightResult, FlightRow
 
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
-COMMIT_EVERY = 0.5  # s
-_APPLICATION = 0x53544F46  # "STOF", in the file's header
+COMMIT_EVERY = 0.5  # s: the longest time that a row waits to be committed
+_APPLICATION = 0x53544F46  # "STOF", SQLite's application id of the journal
 _FORMAT = 1
-_WAIT = 60.0  # s, for a reader to finish
+_WAIT = 60.0  # s, for another process to let go of the journal
 
 _TABLES = f"""
 CREATE TABLE runs (id INTEGER PRIMARY KEY, {", ".join(Provenance._fields)}, ended);
@@ -47,24 +47,24 @@ _FAILED = f"outcome IN ({', '.join(repr(value) for value in _FAILURES)})"
 
 
 class StoreError(HarnessError):
-    """The directory cannot be used: why, in one line."""
+    """The directory of a run cannot be used; the message says why in one line."""
 
 
 class Stored(NamedTuple):
-    """A row as it is kept."""
+    """A row as the store keeps it."""
 
     row: FlightRow  # as `fly --json` prints it
-    final: Mapping[str, float]  # the flight's last state, see `harness.runs.row`
-    seconds: float | None  # wall time of the simulation
-    version: Mapping[str, Any]  # what decided it beside its settings: see `harness.key`
-    run: Mapping[str, Any]  # the provenance, and when the run ended
+    final: Mapping[str, float]  # the last row of the log: see `harness.runs.row.final`
+    seconds: float | None  # wall time of the simulation, s
+    version: Mapping[str, Any]  # everything besides the settings that decided the flight: see `harness.key`
+    run: Mapping[str, Any]  # the provenance of its run, and when that ended
 
 
 class Store:
-    """The journal, open for writing by this process alone. A context: what is left is committed at its end."""
+    """The journal, open for writing by this process alone. A context manager: leaving it commits all changes."""
 
     def __init__(self, folder: Path) -> None:
-        """Makes the directory where there is none. Raises `StoreError`."""
+        """Opens the journal; creates it and its directory if necessary. Raises `StoreError`."""
         self.folder = folder
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"{folder}: is a file, not a folder")
@@ -78,14 +78,14 @@ class Store:
                 fresh = not (folder / JOURNAL).exists()
                 self._journal = sqlite3.connect(folder / JOURNAL, timeout=_WAIT, isolation_level=None)
                 if not fresh:
-                    _check(self._journal, folder, whole=True)
+                    _check(self._journal, folder, thorough=True)
                 if not begun(self._journal):
                     self._journal.executescript(f"BEGIN; {_TABLES} COMMIT;")
         except BaseException:
             os.close(self._lock)
             raise
-        self._begun: float | None = None  # when the first change was made that is not committed yet
-        self._grown = False  # flights are among those changes
+        self._begun: float | None = None  # the time of the first uncommitted change
+        self._grown = False  # whether flights are among the uncommitted changes
         self._versions: set[str] = {i for (i,) in self._all("SELECT id FROM versions")}
         self._run = 0
 
@@ -102,19 +102,20 @@ class Store:
             self._journal.close()
             os.close(self._lock)
 
-    def begin(self, of: Provenance) -> None:
-        """A run begins: rows from now on are its."""
-        self._change(f"INSERT INTO runs VALUES (NULL, {', '.join('?' * len(of))}, NULL)", of)
+    def begin(self, provenance: Provenance) -> None:
+        """Begins a run: all rows added from now on belong to it."""
+        values = ", ".join("?" * len(provenance))
+        self._change(f"INSERT INTO runs VALUES (NULL, {values}, NULL)", provenance)
         ((self._run,),) = self._all("SELECT max(id) FROM runs")
         self.commit()
 
     def end(self) -> None:
-        """The run has ended, with all its flights or not."""
+        """Ends the run, whether all its flights are done or not."""
         self._change("UPDATE runs SET ended = ? WHERE id = ?", (now(), self._run))
         self.commit()
 
     def add_version(self, version: Version, files: Mapping[str, Path]) -> None:
-        """Keeps what decides flights beside their settings, and the files that it has hashes of."""
+        """Keeps a version and the content of its files. Raises `StoreError` if one of them has changed."""
         if version.number in self._versions:
             return
         hashes = version.decides["content"]
@@ -122,15 +123,15 @@ class Store:
             try:
                 content = path.read_bytes()
             except OSError as error:
-                raise StoreError(f"{path}: {error.strerror or error}, while flights were flown") from None
+                raise StoreError(f"{path}: {error.strerror or error}, during the run") from None
             if content_hash(content) != hashes[name]:
-                raise StoreError(f"{path}: has changed while flights were flown: run the same command again")
+                raise StoreError(f"{path}: has changed during the run: run the same command again")
             self._change("INSERT OR IGNORE INTO files VALUES (?, ?)", (hashes[name], content))
         self._change("INSERT INTO versions VALUES (?, ?)", (version.number, json.dumps(version.decides)))
         self._versions.add(version.number)
 
     def add(self, row: FlightRow, result: FlightResult, version: str, position: int) -> None:
-        """Keeps a row, for good within half a second."""
+        """Keeps a row; it is committed within `COMMIT_EVERY`. `version` is the number of its `Version`."""
         self._grown = True
         self._change(
             "INSERT OR REPLACE INTO flights VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -142,15 +143,15 @@ class Store:
         )  # fmt: skip
 
     def place(self, matrix: str, position: int, key: str) -> None:
-        """Remembers that this position of a matrix is that flight."""
+        """Records that the flight at this position of a matrix has this key."""
         self._change("INSERT OR REPLACE INTO positions VALUES (?, ?, ?)", (matrix, position, key))
 
     def keys(self, *, failed: bool = True) -> set[str]:
-        """The flights that are done; without the failed ones when they are to be flown again."""
+        """The keys of all rows; without `failed`, only of those that did not fail."""
         return {key for (key,) in self._all("SELECT key FROM flights" + ("" if failed else f" WHERE NOT {_FAILED}"))}
 
     def commit(self) -> None:
-        """Writes what is not written yet."""
+        """Commits all changes."""
         if self._begun is not None:
             with _store_errors(self.folder):
                 if self._grown:
@@ -159,7 +160,7 @@ class Store:
             self._begun, self._grown = None, False
 
     def tick(self) -> None:
-        """Commits what has waited long enough."""
+        """Commits all changes if the first of them is older than `COMMIT_EVERY`."""
         if self._begun is not None and time.monotonic() - self._begun >= COMMIT_EVERY:
             self.commit()
 
@@ -178,29 +179,29 @@ class Store:
 
 @contextmanager
 def reading(folder: Path) -> Iterator[sqlite3.Connection]:
-    """The journal, to be read only, also while a run writes it. Raises `StoreError`."""
+    """The journal, open for reading, also while a run writes to it. Raises `StoreError`."""
     path = folder / JOURNAL
     if not path.is_file():
         raise StoreError(f"{folder}: holds no results of `harness run` (there is no {JOURNAL})")
     with _store_errors(folder):
-        # Opened for writing where that is allowed: a run that was killed left half a commit, to be rolled back first.
+        # Opened for writing where that is allowed: a run that was killed may have left half a commit to roll back.
         mode = "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
         journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=_WAIT)
         try:
             journal.execute("PRAGMA query_only = ON")
-            _check(journal, folder, whole=False)
+            _check(journal, folder, thorough=False)
             yield journal
         finally:
             journal.close()
 
 
 def begun(journal: sqlite3.Connection) -> bool:
-    """Whether it has its tables: a run may have been killed before it made them."""
+    """Whether the journal has its tables: a run may have been killed before it made them."""
     return bool(journal.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
 
 
 def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
-    """Each version in the store, with the settings of one flight of it."""
+    """The number of each version in the store, with the settings of one of its flights."""
     rows = journal.execute(
         "SELECT v.id, (SELECT settings FROM flights f WHERE f.version = v.id LIMIT 1) AS example FROM versions v "
         "WHERE example IS NOT NULL"
@@ -209,7 +210,7 @@ def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
 
 
 def positions(journal: sqlite3.Connection, matrix: str, versions: Sequence[str], *, failed: bool) -> set[int]:
-    """The positions of a matrix whose flight is done in one of these versions; without failed ones if so asked."""
+    """The positions of a matrix whose flight is done in one of these versions; failed flights only if `failed`."""
     rows = journal.execute(
         "SELECT p.position FROM positions p JOIN flights f USING (key) "
         f"WHERE p.matrix = ? AND f.version IN ({', '.join('?' * len(versions))})"
@@ -220,20 +221,20 @@ def positions(journal: sqlite3.Connection, matrix: str, versions: Sequence[str],
 
 
 def find(folder: Path, beginning: str) -> Stored:
-    """The one row whose key begins so. Raises `StoreError`."""
+    """The only row whose key begins with `beginning`. Raises `StoreError` if there is none, or several."""
     with reading(folder) as journal:
         journal.row_factory = sqlite3.Row
-        found = journal.execute(
+        rows = journal.execute(
             "SELECT f.*, v.decides FROM flights f JOIN versions v ON v.id = f.version "
             "WHERE substr(f.key, 1, ?) = ? ORDER BY f.key LIMIT 6",
             (len(beginning), beginning),
         ).fetchall()
-        if not found or not beginning:
+        if not rows or not beginning:
             raise StoreError(f"{folder}: no flight has a key that begins with {beginning!r}")
-        if len(found) > 1:
-            keys = ", ".join(row["key"] for row in found[:5]) + (", ..." if len(found) > 5 else "")
+        if len(rows) > 1:
+            keys = ", ".join(row["key"] for row in rows[:5]) + (", ..." if len(rows) > 5 else "")
             raise StoreError(f"{folder}: the key {beginning!r} is ambiguous: {keys}")
-        kept = dict(found[0])
+        kept = dict(rows[0])
         run = dict(journal.execute("SELECT * FROM runs WHERE id = ?", (kept["run"],)).fetchone())
     row = {
         "key": kept["key"],
@@ -248,17 +249,17 @@ def find(folder: Path, beginning: str) -> Stored:
 
 
 def last_run(folder: Path) -> Mapping[str, Any]:
-    """The provenance of the latest run in this directory, and when it ended. Raises `StoreError`."""
+    """The provenance of the latest run in this directory, and when that ended. Raises `StoreError`."""
     with reading(folder) as journal:
         journal.row_factory = sqlite3.Row
-        found = journal.execute("SELECT * FROM runs ORDER BY id DESC LIMIT 1").fetchone()
-    if found is None:
+        latest = journal.execute("SELECT * FROM runs ORDER BY id DESC LIMIT 1").fetchone()
+    if latest is None:
         raise StoreError(f"{folder}: no run has begun here")
-    return dict(found)
+    return dict(latest)
 
 
 def on_each_plant(folder: Path, settings: Mapping[str, Any]) -> dict[str, str]:
-    """The keys of the rows whose settings differ from these in the plant alone, by plant; the latest of each."""
+    """By plant, the key of the latest row whose settings equal these but for the plant."""
     with reading(folder) as journal:
         return dict(
             journal.execute(
@@ -270,17 +271,17 @@ def on_each_plant(folder: Path, settings: Mapping[str, Any]) -> dict[str, str]:
 
 
 def content(folder: Path, digest: str) -> bytes:
-    """A file that a flight read, by its hash. Raises `StoreError`."""
+    """The content of a file that a flight read, by its hash. Raises `StoreError`."""
     with reading(folder) as journal:
-        found = journal.execute("SELECT content FROM files WHERE hash = ?", (digest,)).fetchone()
-    if found is None:
-        raise StoreError(f"{folder}: a file that the flight read is not in the store")
-    return bytes(found[0])
+        row = journal.execute("SELECT content FROM files WHERE hash = ?", (digest,)).fetchone()
+    if row is None:
+        raise StoreError(f"{folder}: the store lacks a file that the flight read")
+    return bytes(row[0])
 
 
 @contextmanager
 def _store_errors(folder: Path) -> Iterator[None]:
-    """SQLite's errors as a `StoreError` that says what to do."""
+    """Turns an error of SQLite into a `StoreError` that says what to do."""
     try:
         yield
     except sqlite3.DatabaseError as error:
@@ -291,31 +292,31 @@ def _store_errors(folder: Path) -> Iterator[None]:
         elif name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
             why = f"{path}: cannot be written: {error}"
         elif name.startswith("SQLITE_IOERR"):
-            why = f"{path}: {error}: finished flights are kept; when the disk is sound, run the same command"
+            why = f"{path}: {error}: finished flights are kept; repair the disk, then run the same command again"
         elif name.startswith("SQLITE_BUSY"):
-            why = f"{path}: another process has held it for {_WAIT:g} s"
+            why = f"{path}: another process has locked it for {_WAIT:g} s"
         else:
-            why = f"{path}: is damaged, or no journal of the harness ({error}): nothing was changed; move it away"
+            why = f"{path}: is damaged, or not a journal of the harness ({error}): nothing was changed; move it away"
         raise StoreError(why) from None
 
 
-def _check(journal: sqlite3.Connection, folder: Path, *, whole: bool) -> None:
-    """Whether it is a journal of this format, and, asked for the whole of it, undamaged."""
+def _check(journal: sqlite3.Connection, folder: Path, *, thorough: bool) -> None:
+    """Raises `StoreError` for a file that is not a journal of this format or, when `thorough`, is damaged."""
     ((application,),) = journal.execute("PRAGMA application_id")
     ((version,),) = journal.execute("PRAGMA user_version")
     path = folder / JOURNAL
     if not application and not begun(journal):
         return
     if application != _APPLICATION:
-        raise StoreError(f"{path}: is no journal of the harness: nothing was changed; move it away")
+        raise StoreError(f"{path}: is not a journal of the harness: nothing was changed; move it away")
     if version != _FORMAT:
         raise StoreError(f"{path}: has format {version}, this harness reads format {_FORMAT}: use another directory")
-    if whole and (damage := journal.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
+    if thorough and (damage := journal.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
         raise StoreError(f"{path}: is damaged ({' '.join(damage.split())}): nothing was changed; move it away")
 
 
 def _locked(path: Path) -> int:
-    """The open lock file. The operating system lets go of the lock when the process ends, however it ends."""
+    """Locks the file and returns it open. The system releases the lock when this process ends, however it ends."""
     import fcntl
 
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -324,7 +325,7 @@ def _locked(path: Path) -> int:
     except OSError:
         by = os.read(lock, 200).decode(errors="replace").strip()
         os.close(lock)
-        raise StoreError(f"{path.parent}: another run writes there ({by}): wait for it, or use another --out") from None
+        raise StoreError(f"{path.parent}: another run writes to it ({by}): wait for it, or use another --out") from None
     os.ftruncate(lock, 0)
     os.write(lock, f"process {os.getpid()} on {socket.gethostname()} since {now()}\n".encode())
     return lock

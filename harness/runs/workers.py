@@ -1,8 +1,8 @@
-"""Worker processes: they fly what they are given, and what one of them loses is one flight.
+"""Worker processes that fly flights; a worker that dies or hangs costs one flight.
 
-Flights go out in chunks, since a kinematic one takes little longer than a message. Each worker notes in shared memory
-which flight of its chunk it is at and since when, so a death or a hang costs that flight alone: the rest of its chunk
-is flown again.
+Flights are sent in chunks, because a kinematic flight takes little longer than a message. Each worker notes in shared
+memory which flight of its chunk it flies and since when. So a death or a hang loses that flight alone: the rest of the
+chunk is flown again.
 """
 
 import multiprocessing
@@ -37,19 +37,19 @@ THREADS = (
     "NUMEXPR_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
-AHEAD = 2  # chunks per worker that are sent out: one in flight, one waiting
-SHORTEST_TIMEOUT = 10.0  # s: below it, a busy machine would decide which flights hang
-_RECORDING = 60.0  # s, that writing a recording may take besides
-_STALLED = 30.0  # s without any worker at work
-_MOST_RESTARTS = 3  # of the workers, without any flight done in between
+AHEAD = 2  # chunks sent out per worker: one is flown, one waits
+SHORTEST_TIMEOUT = 10.0  # s: with a shorter one, flights would time out because the machine is busy
+_RECORDING = 60.0  # s added to the timeout of a flight that is recorded
+_STALLED = 30.0  # s without any busy worker, after which all are restarted
+_MOST_RESTARTS = 3  # of the workers, with no flight done in between
 _MOST_TASKS = 64  # in a chunk
-_PIPE = 48_000  # bytes of waiting messages: a full pipe would block, for ever if no worker is left to read it
-_NONE = -1
+_PIPE = 48_000  # bytes of waiting messages: a full pipe blocks this process, for ever if all workers are dead
+_NONE = -1  # no flight of the chunk has begun
 _SPAWN = multiprocessing.get_context("spawn")
 
 
 class WorkersError(HarnessError):
-    """The workers cannot fly: why, in one line."""
+    """The workers cannot fly; the message says why in one line."""
 
 
 class Task(NamedTuple):
@@ -58,30 +58,30 @@ class Task(NamedTuple):
     key: str
     position: int
     flight: Flight
-    version: str  # a hash of all that decides it beside its settings, as it was when the task was made
+    version: str  # the number of its `Version` when the task was made
     record: str  # when to write a recording: all | failed | none
 
 
 class WorkerResult(NamedTuple):
-    """What a worker answers."""
+    """A worker's answer to a task."""
 
     result: FlightResult
-    version: str  # as it was when the flight had been flown
-    recording: str = ""  # what went wrong with writing it, if anything
+    version: str  # the number of its `Version` after the flight
+    recording: str = ""  # what went wrong in writing the recording; empty if nothing did
 
 
 class Done(NamedTuple):
-    """A task, and how it went."""
+    """A task and its result."""
 
     task: Task
-    flown: WorkerResult
+    result: WorkerResult
 
 
 Fly = Callable[[Task, Path], WorkerResult]
 
 
 def fly_task(task: Task, folder: Path) -> WorkerResult:
-    """In a worker: flies it, and writes its recording when asked to."""
+    """Flies a task, in a worker, and writes its recording if the task asks for one."""
     begin = time.perf_counter()
     log = simulate_safely(task.flight)
     result = result_of(log, time.perf_counter() - begin)
@@ -101,9 +101,9 @@ def _failed(task: Task, outcome: Outcome, reason: str) -> Done:
 class _Chunk:
     tasks: Sequence[Task]
     slot: int = 0  # its place in the shared memory
-    size: int = 0  # bytes of its message
+    size: int = 0  # bytes, of its message
     hung: int | None = None  # the number of the flight that took too long
-    deaths: int = 0  # of workers that had it and had begun none of its flights
+    deaths: int = 0  # of workers that held it but had not begun any of its flights
 
 
 def fly_all(
@@ -115,10 +115,10 @@ def fly_all(
     timeout: float | None = None,
     fly: Fly = fly_task,
 ) -> Generator[Done | None]:
-    """Flies the tasks, a few chunks ahead of what is done; None now and then when nothing has come in.
+    """Flies the tasks and yields each when it is done, in any order; None now and then while there is nothing to yield.
 
-    Without workers they are flown in this process, one by one, and nothing is timed. Closing the generator ends every
-    worker at once.
+    A few chunks are sent out ahead. With `workers` = 0 the tasks are flown in this process, one by one, without a
+    timeout. Closing the generator ends every worker at once. Raises `WorkersError` when workers cannot be kept alive.
     """
     if not workers:
         for task in tasks:
@@ -137,14 +137,14 @@ class _Flying:
         self.wall_time = wall_time
         self.again: deque[_Chunk] = deque()  # to be flown again
         self.out: dict[Future[list[WorkerResult | str]], _Chunk] = {}
-        # For each slot: the number of the flight in its chunk, and since when (the monotonic clock is the machine's).
-        # A worker that is being ended may still write to its slot: there are enough to use that one last.
+        # For each slot: which flight of its chunk is flown, and since when (all processes share the monotonic clock).
+        # A worker that is being ended may still write to its slot, so a slot is reused as late as possible.
         slots = 16 * AHEAD * workers
         self.begun = _SPAWN.RawArray("d", 2 * slots)
         self.slots = deque(range(slots))
         self.pool = self._pool()
         self.restarts = 0  # since a flight was done
-        self.moved = time.monotonic()  # when a worker was last seen with a chunk
+        self.moved = time.monotonic()  # the last time a worker was busy
 
     def results(self) -> Iterator[Done | None]:
         try:
@@ -159,15 +159,15 @@ class _Flying:
                 self._end_hung()
                 if done or any(future.running() for future in self.out):
                     self.moved = time.monotonic()
-                elif time.monotonic() - self.moved > _STALLED:  # a worker was killed while it held their common lock
+                elif time.monotonic() - self.moved > _STALLED:  # a worker was killed while it held the lock they share
                     self._restart()
         finally:
             self._stop()
 
     def _pool(self) -> ProcessPool:
-        for name in THREADS:  # before spawn: a library reads it when it is loaded
+        for name in THREADS:  # before the spawn: a library reads it when it is loaded
             os.environ[name] = "1"
-        # Threads and processes started now leave Ctrl-C to this thread.
+        # Threads and processes started here ignore Ctrl-C, which this thread handles.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             pool = ProcessPool(
@@ -187,7 +187,7 @@ class _Flying:
         self.pool.join()
 
     def _restart(self) -> None:
-        """New workers; what the old ones had is flown again."""
+        """Replaces all workers; the chunks of the old ones are flown again."""
         self.restarts += 1
         if self.restarts > _MOST_RESTARTS:
             raise WorkersError("the worker processes end as soon as they are started")
@@ -199,7 +199,7 @@ class _Flying:
         self.pool = self._pool()
 
     def _send(self) -> bool:
-        """Keeps the workers busy; whether there was anything to send."""
+        """Sends chunks until every worker has enough; returns whether it sent any."""
         sent = False
         while len(self.out) < AHEAD * self.workers:
             chunk = self.again.popleft() if self.again else self._next_chunk()
@@ -232,14 +232,14 @@ class _Flying:
         return _Chunk(tasks) if tasks else None
 
     def _end_hung(self) -> None:
-        """Has workers killed whose flight takes too long."""
+        """Ends every worker whose flight takes longer than its timeout."""
         for future, chunk in self.out.items():
             number, since = self.begun[2 * chunk.slot : 2 * chunk.slot + 2]
             if number == _NONE or chunk.hung is not None:
                 continue
             if time.monotonic() - since > self._limit(chunk.tasks[int(number)]):
                 chunk.hung = int(number)
-                future.cancel()  # Pebble ends the worker of a cancelled task that runs
+                future.cancel()  # Pebble ends the worker of a running task that is cancelled
 
     def _limit(self, task: Task) -> float:
         limit = self.timeout or max(SHORTEST_TIMEOUT, 20.0 * self.wall_time.seconds(task.flight))
@@ -264,7 +264,7 @@ class _Flying:
                 yield Done(task, answer)
 
     def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:
-        """The chunk's worker died or was ended: the flight that it was at is lost, the others are flown again."""
+        """The worker of the chunk died or was ended: the flight it flew is lost, the others are flown again."""
         at = int(self.begun[2 * chunk.slot]) if chunk.hung is None else chunk.hung
         rest = list(chunk.tasks)
         if at != _NONE:
@@ -275,7 +275,7 @@ class _Flying:
                 yield _failed(task, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
             else:
                 yield _failed(task, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
-        else:  # between two flights: the fault of none
+        else:  # between two flights: none of them is to blame
             chunk.deaths += 1
             if chunk.deaths > _MOST_RESTARTS:
                 raise WorkersError(f"worker processes end before they can fly: {error}")
@@ -285,7 +285,7 @@ class _Flying:
 
 # In a worker
 
-_SHARED: dict[str, Any] = {}  # what its pool gave this process when it began
+_SHARED: dict[str, Any] = {}  # set once per process by `_prepare`
 
 
 def _prepare(begun: Any, folder: Path, fly: Fly) -> None:
@@ -294,7 +294,7 @@ def _prepare(begun: Any, folder: Path, fly: Fly) -> None:
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed ends at once: nobody waits for its flight."""
+    """Ends this worker as soon as its parent has ended, because nobody waits for its flight."""
     parent = multiprocessing.parent_process()
     assert parent
     parent.join()
@@ -302,7 +302,7 @@ def _end_with_parent() -> None:
 
 
 def _fly_chunk(slot: int, message: bytes) -> list[WorkerResult | str]:
-    """The answer to each task of a message, or what went wrong with it."""
+    """For each task of a message its result, or in words what went wrong."""
     tasks: list[Task] = pickle.loads(zlib.decompress(message))
     begun, folder, fly = _SHARED["begun"], _SHARED["folder"], _SHARED["fly"]
     answers: list[WorkerResult | str] = []
@@ -311,7 +311,7 @@ def _fly_chunk(slot: int, message: bytes) -> list[WorkerResult | str]:
         begun[2 * slot] = float(number)
         try:
             answers.append(fly(task, folder))
-        except Exception as error:  # a fault of the harness, or a file gone: of this flight, not of the others
+        except Exception as error:  # a fault of the harness, or a missing file: it concerns this flight only
             answers.append(f"it could not be flown: {type(error).__name__}: {error}")
     begun[2 * slot] = _NONE
     return answers

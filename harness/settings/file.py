@@ -79,7 +79,7 @@ def load_flight(path: str | Path, overrides: Sequence[str] = ()) -> Flight:
 
     Raises `SettingsError` with every mistake, each with its line and what is allowed; also when it cannot be read.
 
-    >>> flight = load_flight("experiments/stationary.toml", ["plant=kinematic", "start.heading_deg=60"])
+    >>> flight = harness.load_flight("experiments/stationary.toml", ["plant=kinematic", "start.heading_deg=60"])
     """
     return read_settings(Path(path), overrides).flight()
 

@@ -25,6 +25,7 @@ def _written_value(value: object, setting: Setting) -> object:
         return [_written_value(element, setting) for element in value]
     if setting.table:
         return written(value)
-    if isinstance(value, float):
-        return "inf" if math.isinf(value) else in_file(value, setting.unit)
+    if setting.kind is float and isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value)  # in Python 100 may stand for 100.0: it is the same flight
+        return "inf" if math.isinf(number) else in_file(number, setting.unit)
     return value
