@@ -15,7 +15,7 @@ from harness.plants.ladder import PLANTS
 from harness.settings import document
 
 PHYSICS_VERSION = 3  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
-METRICS_VERSION = 2  # of what a log is judged by: raised whenever a change there moves a metric
+METRICS_VERSION = 3  # of what a log is judged by: raised whenever a change there moves a metric
 
 
 class Version(NamedTuple):

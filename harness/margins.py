@@ -51,15 +51,13 @@ class Assess:
         float,
         Gt(0),
         About(
-            "rms of the last half over the standoff distance; where the baseline's is larger its law does not circle, "
+            "settled error, rms, over the standoff distance; where the baseline's is larger its law does not circle, "
             "and the pair says nothing of the cost. Ours: a quarter, beyond all that a law that circles was seen to do"
         ),
     ] = 0.25
-    range_error_margin: Annotated[
-        Metres, Gt(0), About("rms over the last half. Ours: 1 % of the standoff distance")
-    ] = 2.0
+    range_error_margin: Annotated[Metres, Gt(0), About("settled error, rms. Ours: 1 % of the standoff distance")] = 2.0
     saturation_margin: Annotated[
-        float, Gt(0), About("share of the last half at the limit. Ours: a twentieth of the time")
+        float, Gt(0), About("share of the time at the limit. Ours: a twentieth of the time")
     ] = 0.05
     command_activity_margin: Annotated[
         DegreesPerSecond2, Gt(0), About("Ours: the paper's 5 deg/s reached and left again once in 10 s")

@@ -4,27 +4,41 @@ All that names, prints, compares or stores a metric reads its declaration: `harn
 `run` and `show`, the columns of results, the comparison and its report. To add a metric, write one entry.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.feasibility import feasibility_margin
 from harness.log import FlightLog
+from harness.plants.plant import Outcome
 from harness.plants.turn import rate_of_turn
-from harness.series import overshoot, peak, rms, settling_time
+from harness.series import azimuth, overshoot, peak, rms, settling_time
 
 Array = NDArray[np.float64]
-Value = float | bool | None  # None: the plant has no such thing, or the flight does not show it
+Value = (
+    float | bool | None
+)  # None, or NaN from `Metric.measure`: there is no such thing, or this flight tells nothing of it
 
 YES_OR_NO = "yes/no"  # the unit of a metric that is true or false
-SETTLED_FOR = 5.0  # s
+SETTLED_FOR = 5.0  # s: at least so much of the flight is left after convergence
 AVERAGED_OVER = 0.25  # s
 LONGEST_LAG = 2.0  # s
 LEAST_EXCITATION = np.radians(0.5)  # rad/s: a command, or a turn, that varies less tells nothing of lag or ratio
+AS_WELL = 0.9  # share of what the best delay explains: a smaller delay that explains so much is taken
 LEAST_EXPLAINED = 0.5  # share of the flown rate's variation: a command that explains less tells nothing of the lag
+
+
+class Window(NamedTuple):
+    """The rows over which circling is judged: from `first` to the end of the flight."""
+
+    first: int
+    laps: int | None  # whole laps; 0: less than one is left after convergence; None: the last half of the flight
 
 
 @dataclass(frozen=True)
@@ -54,13 +68,34 @@ class Signals:
         return _lag_and_gain(self.held_command, self.flown_rate, self.period)
 
     def settling_time(self, tolerances: float = 1.0) -> float | None:
-        """When |range error| is below so many times the flight's tolerance for good, s; see `SETTLED_FOR`."""
+        """When |range error| is below so many times the flight's tolerance for good, s; see `SETTLED_FOR`.
+
+        None of a flight that ended early: what it would have done next is not known.
+        """
+        if self.log.outcome is not Outcome.COMPLETED:
+            return None
         tolerance = tolerances * self.log.flight.metrics.tolerance
         return settling_time(self.log["time"], self.log["range_error"], tolerance, SETTLED_FOR)
 
+    @cached_property
+    def window(self) -> Window:
+        """After convergence the last whole laps round the target, or all that is left when that is less than a lap.
+
+        Of a flight that does not converge: its last half. So too of a circle that the heading-rate limit cannot hold,
+        which every lap leaves again: that the flight happens to end near it does not make it settled.
+        """
+        log, converged = self.log, self.settling_time()
+        if converged is None or feasibility_margin(log.flight) < 0.0:
+            return Window(len(log) // 2, None)
+        first = int(np.searchsorted(log["time"], converged))
+        around = azimuth(log["north"] - log["target_north"], log["east"] - log["target_east"])[first:]
+        left = np.abs(around[-1] - around)  # rad round the target from each row to the end
+        laps = int(left[0] / math.tau)
+        return Window(first + int(np.flatnonzero(left >= laps * math.tau)[-1]) if laps else first, laps)
+
     def circling(self, column: str) -> Array:
-        """The rows of a column over which circling is judged."""
-        return self.log[column][len(self.log) // 2 :]
+        """The rows of a column over which circling is judged: see `window`."""
+        return self.log[column][self.window.first :]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,14 +105,15 @@ class Metric:
     name: str  # its key in every table and file, which ends with the unit
     unit: str  # "s", "deg/s2"; "1" of a ratio; `YES_OR_NO`
     meaning: str  # one line
-    measure: Callable[[Signals], Value]
+    measure: Callable[[Signals], Value]  # what is not finite counts as None
     heading: str  # what tables and figures call it
     statistic: str = ""  # printed after the unit: "rms", "peak"
     percent: bool = False  # a share, in percent where the heading says so
     in_short_tables: bool = False  # those that `run` and `demo` print
     of_circling: bool = False  # it means something only where the law circles its target
-    ideal: float | None = 0.0  # the best there can be; None: none is better, and a comparison leaves it out
+    ideal: float = 0.0  # the best there can be
     worst: float | None = None  # the worst there can be; None: there is no bound
+    compared: bool = True  # False: no row of its own in the tables of a comparison
 
     @property
     def label(self) -> str:
@@ -100,7 +136,27 @@ def measure(log: FlightLog) -> dict[str, float | bool | None]:
     if not len(log):
         return dict.fromkeys(METRICS)
     signals = Signals(log)
-    return {name: metric.measure(signals) for name, metric in METRICS.items()}
+    return {name: _known(metric.measure(signals)) for name, metric in METRICS.items()}
+
+
+def _known(value: Value) -> Value:
+    """None in place of what is not finite: the plant has no such thing."""
+    return value if value is None or math.isfinite(value) else None
+
+
+def window_in_words(metrics: Mapping[str, Value]) -> str:
+    """Over which part of a flight its circling was judged, by the metrics; empty of a flight without a row."""
+    begin, end, laps = (metrics.get(name) for name in ("window_begin_s", "window_end_s", "window_laps"))
+    if begin is None or end is None:
+        return ""
+    if laps is None:
+        left = metrics["convergence_time_s"] is not None
+        which = f"the last half, since {'the circle cannot be held' if left else 'the flight did not converge'}"
+    elif not laps:
+        which = "what is left after convergence, less than a lap"
+    else:
+        which = "the last whole lap" if laps == 1 else f"the last {laps:g} whole laps"
+    return f"Circling is judged from {begin:g} s to {end:g} s: {which}."
 
 
 def _saturation(signals: Signals) -> float:
@@ -113,24 +169,28 @@ def _activity(signals: Signals) -> float:
     return float(np.degrees(np.abs(np.diff(command)).sum() / max(time[-1] - time[0], signals.period)))
 
 
-def _heading_rate_error(signals: Signals) -> float | None:
+def _heading_rate_error(signals: Signals) -> float:
     apart = signals.flown_rate - signals.held_command
-    return _degrees(rms(_averaged(apart, AVERAGED_OVER / signals.period)))
+    return math.degrees(rms(_averaged(apart, AVERAGED_OVER / signals.period)))
 
 
 def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | None, float | None]:
     """The delay at which the command explains most of the flown rate's variation, and the ratio there.
 
     Both by least squares, and exact for a pure delay: over a period, a held command delayed by a share of a period is
-    a mix of two neighbours. A slow command tells the ratio, not the delay: it has to change by `LEAST_EXCITATION`
-    within `AVERAGED_OVER`; nor does one tell it that gusts outweigh.
+    a mix of two neighbours. Behind a periodic command, as of a limit cycle, delays of a period more explain as well:
+    the smallest is taken, since a loop that swings by itself lags by less than its period.
+
+    A slow command tells the ratio, not the delay: it has to change by `LEAST_EXCITATION` within `AVERAGED_OVER`; nor
+    does one tell it that gusts outweigh.
     """
     longest = min(round(LONGEST_LAG / period), len(command) // 2)
     if longest < 1 or np.std(command) < LEAST_EXCITATION:
         return None, None
     y = flown[longest:]  # what was commanded before the flight is not known
     explained, share = _mixes(command, y, longest)
-    n = int(np.argmax(explained))
+    peaks = (explained >= AS_WELL * explained.max()) & (explained >= np.append(explained[1:], -np.inf))
+    n = int(np.argmax(peaks))  # the first
     u, later = (command[longest - k : len(command) - k] for k in (n, n + 1))
     mixed = (1.0 - share[n]) * u + share[n] * later
     gain = float(mixed @ y) / max(float(mixed @ mixed), 1e-300)
@@ -177,7 +237,7 @@ def _turn_ratio(signals: Signals) -> float | None:
     if np.isnan(bank).all():  # the plant has none
         return None
     coordinated = rate_of_turn(log["airspeed"], bank)
-    if (rms(coordinated) or 0.0) < LEAST_EXCITATION:
+    if rms(coordinated) < LEAST_EXCITATION:
         return None
     return float(coordinated @ log["heading_rate"] / (coordinated @ coordinated))
 
@@ -186,10 +246,6 @@ def _averaged(x: Array, samples: float) -> Array:
     """A centred moving average: it delays nothing."""
     window = np.ones(max(1, round(samples)))
     return np.convolve(x, window / window.size, mode="valid") if len(x) >= window.size else x
-
-
-def _degrees(x: float | None) -> float | None:
-    return None if x is None else float(np.degrees(x))
 
 
 _METRICS = (
@@ -203,6 +259,50 @@ _METRICS = (
         of_circling=True,
     ),
     Metric(
+        name="convergence_time_half_tolerance_s",
+        unit="s",
+        meaning="the same for half the tolerance: a comparison of times that it turns round rests on the tolerance",
+        measure=lambda signals: signals.settling_time(0.5),
+        heading="convergence time",
+        statistic="at half the tolerance",
+        of_circling=True,
+        compared=False,
+    ),
+    Metric(
+        name="convergence_time_double_tolerance_s",
+        unit="s",
+        meaning="the same for twice the tolerance",
+        measure=lambda signals: signals.settling_time(2.0),
+        heading="convergence time",
+        statistic="at twice the tolerance",
+        of_circling=True,
+        compared=False,
+    ),
+    Metric(
+        name="window_begin_s",
+        unit="s",
+        meaning="circling is judged from then: the last whole laps after convergence, else see window_laps",
+        measure=lambda signals: float(signals.circling("time")[0]),
+        heading="judged from",
+        compared=False,
+    ),
+    Metric(
+        name="window_end_s",
+        unit="s",
+        meaning="circling is judged until then",
+        measure=lambda signals: float(signals.circling("time")[-1]),
+        heading="judged until",
+        compared=False,
+    ),
+    Metric(
+        name="window_laps",
+        unit="1",
+        meaning="whole laps judged; 0: less than one is left after convergence; none: the last half, not settled",
+        measure=lambda signals: None if signals.window.laps is None else float(signals.window.laps),
+        heading="laps judged",
+        compared=False,
+    ),
+    Metric(
         name="range_error_final_m",
         unit="m",
         meaning="range error at the end",
@@ -214,7 +314,7 @@ _METRICS = (
     Metric(
         name="range_error_rms_m",
         unit="m",
-        meaning="range error over the last half",
+        meaning="range error while circling is judged",
         measure=lambda signals: rms(signals.circling("range_error")),
         heading="settled error",
         statistic="rms",
@@ -224,7 +324,7 @@ _METRICS = (
     Metric(
         name="range_error_peak_m",
         unit="m",
-        meaning="largest |range error| over the last half",
+        meaning="largest |range error| while circling is judged",
         measure=lambda signals: peak(signals.circling("range_error")),
         heading="settled error",
         statistic="peak",
@@ -243,7 +343,7 @@ _METRICS = (
     Metric(
         name="saturation_fraction",
         unit="1",
-        meaning="share of the last half with the command at its limit",
+        meaning="share of the time with the command at its limit, while circling is judged",
         measure=_saturation,
         heading="saturation",
         statistic="share",
@@ -255,7 +355,7 @@ _METRICS = (
     Metric(
         name="command_activity_deg_s2",
         unit="deg/s2",
-        meaning="total variation of the command per second, over the last half",
+        meaning="total variation of the command per second, while circling is judged",
         measure=_activity,
         heading="command activity",
         in_short_tables=True,
@@ -296,7 +396,7 @@ _METRICS = (
         name="bank_peak_deg",
         unit="deg",
         meaning="largest |bank|",
-        measure=lambda signals: _degrees(peak(signals.log["bank"])),
+        measure=lambda signals: math.degrees(peak(signals.log["bank"])),
         heading="bank",
         statistic="peak",
         in_short_tables=True,
@@ -305,7 +405,7 @@ _METRICS = (
         name="sideslip_rms_deg",
         unit="deg",
         meaning="sideslip over the flight",
-        measure=lambda signals: _degrees(rms(signals.log["sideslip"])),
+        measure=lambda signals: math.degrees(rms(signals.log["sideslip"])),
         heading="sideslip",
         statistic="rms",
     ),
@@ -313,7 +413,7 @@ _METRICS = (
         name="sideslip_peak_deg",
         unit="deg",
         meaning="largest |sideslip|",
-        measure=lambda signals: _degrees(peak(signals.log["sideslip"])),
+        measure=lambda signals: math.degrees(peak(signals.log["sideslip"])),
         heading="sideslip",
         statistic="peak",
         in_short_tables=True,

@@ -1,4 +1,6 @@
-"""What a time series is summarised by: size, settling, overshoot. Arrays of one dimension; None where undefined."""
+"""What a time series is summarised by: size, settling, overshoot. Arrays of one dimension."""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,14 +8,14 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def rms(x: Array) -> float | None:
-    """The root of the mean square; None of nothing, or of what is not all finite."""
-    return float(np.sqrt(np.mean(x * x))) if len(x) and np.isfinite(x).all() else None
+def rms(x: Array) -> float:
+    """The root of the mean square; NaN of nothing."""
+    return math.sqrt(np.mean(x * x)) if len(x) else math.nan
 
 
-def peak(x: Array) -> float | None:
-    """The largest size; None of nothing, or of what is not all finite."""
-    return float(np.abs(x).max()) if len(x) and np.isfinite(x).all() else None
+def peak(x: Array) -> float:
+    """The largest size; NaN of nothing, or where one value is."""
+    return float(np.abs(x).max()) if len(x) else math.nan
 
 
 def settling_time(time: Array, error: Array, tolerance: float, least: float) -> float | None:

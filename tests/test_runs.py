@@ -14,12 +14,13 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 import harness
-from harness.metric import METRICS
+from harness.metric import METRICS, YES_OR_NO
 from harness.runs.matrix import read_matrix
-from harness.runs.results import PARQUET, mixed_versions
+from harness.runs.results import PARQUET, export, mixed_versions
 from harness.runs.store import JOURNAL, find, reading
 from harness.runs.story import story
 from harness.settings import read_settings
@@ -66,6 +67,33 @@ def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: P
     assert "0 flown, 10 earlier, 0 failed" in again.stdout
     assert (out / PARQUET).stat().st_mtime_ns == exported  # there was nothing to add
     pd.testing.assert_frame_equal(harness.load_results(out), results)
+
+
+def test_the_exported_table_says_of_each_column_what_it_is(file: Path, tmp_path: Path) -> None:
+    fly_matrix(file, tmp_path / "out")
+    export(tmp_path / "out")
+    schema = pq.read_schema(tmp_path / "out" / PARQUET)
+    kinds = {field.name: field.metadata[b"kind"].decode() for field in schema}
+    assert {name for name, kind in kinds.items() if kind == "metric"} == set(METRICS)
+    results = {"key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds", "run", "version"}
+    assert {name for name, kind in kinds.items() if kind == "result"} == results
+    assert schema.field("bank_peak_deg").metadata[b"unit"] == b"deg"
+
+
+def test_results_flown_before_a_metric_was_added_have_its_column_without_a_value(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fly_matrix(file, tmp_path / "out")
+    added = {
+        "added_m": replace(METRICS["overshoot_m"], name="added_m"),
+        "is_added": replace(METRICS["overshoot_m"], unit=YES_OR_NO),
+    }
+    monkeypatch.setattr("harness.runs.results.METRICS", {**METRICS, **added})
+    results = harness.load_results(tmp_path / "out")
+    assert results["added_m"].isna().all()
+    assert results["added_m"].dtype == float
+    assert results["is_added"].isna().all()
+    assert results["is_added"].dtype == "boolean"
 
 
 def test_a_file_in_the_place_of_the_directory_is_told_and_left(file: Path) -> None:

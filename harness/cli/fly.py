@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -49,10 +49,8 @@ def fly(
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
     from harness.loop import simulate
-    from harness.metric import METRICS
     from harness.runs.recall import row_address
     from harness.runs.row import result_of, row
-    from harness.tables import number
 
     if not live and (pace is not None or port is not None):
         raise BadInput("--pace and --port are of --live: add it")
@@ -85,9 +83,7 @@ def fly(
     if as_json:
         click.echo(json.dumps(flight_row, allow_nan=False))
     else:
-        _tell(
-            flight_row, {name: (number(value), METRICS[name].meaning) for name, value in flight_row["metrics"].items()}
-        )
+        _tell(flight_row)
     raise SystemExit(1 if log.outcome.failed else 0)
 
 
@@ -126,9 +122,16 @@ def _compare(recalled: Recalled, result: FlightResult) -> None:
         click.echo("the same flight as stored, to the last bit", err=True)
 
 
-def _tell(result: Mapping[str, object], rows: dict[str, tuple[str, str]]) -> None:
-    for name, (value, meaning) in rows.items():
-        click.echo(f"  {name:30}{value:>9}  {click.style(meaning, dim=True)}")
-    reason = f": {result['reason']}" if result["reason"] else ""
-    click.echo(f"{result['outcome']}{reason}")
-    click.echo(f"key {result['key']}  digest {result['digest']}")
+def _tell(flight_row: Mapping[str, Any]) -> None:
+    from harness.metric import METRICS, window_in_words
+    from harness.tables import number, table
+
+    metrics = flight_row["metrics"]
+    rows = ([name, number(value), click.style(METRICS[name].meaning, dim=True)] for name, value in metrics.items())
+    for line in table([], rows, "lrl"):
+        click.echo(f"  {line}")
+    if judged := window_in_words(metrics):
+        click.echo(judged)
+    reason = f": {flight_row['reason']}" if flight_row["reason"] else ""
+    click.echo(f"{flight_row['outcome']}{reason}")
+    click.echo(f"key {flight_row['key']}  digest {flight_row['digest']}")

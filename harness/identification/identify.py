@@ -29,6 +29,7 @@ from harness.plants.identified import Identified
 from harness.plants.plant import Plant, Start
 from harness.plants.state import State
 from harness.plants.turn import rate_of_turn
+from harness.series import rms
 from harness.world.air import Air
 
 _BANK = State._fields.index("bank")
@@ -119,7 +120,7 @@ def identify(airframe: Path, airspeed: float, done: Callable[[], None] = lambda:
         identified=replace(found, measured=measured, errors=errors),
         steps=steps,
         sweeps=sweeps,
-        airspeed_error=(_rms(change - entries[-1].output), _rms(entries[-1].output)),
+        airspeed_error=(rms(change - entries[-1].output), rms(entries[-1].output)),
     )
 
 
@@ -167,16 +168,16 @@ def frequency_response(record: Record) -> FrequencyResponse:
     count = round(SWEEP_PERIOD / STEP)
     multiples = np.round(manoeuvres.lines() / manoeuvres.SLOWEST).astype(int)
     command, rate = (np.fft.rfft(values[-count:])[multiples] for values in (record.command, record.heading_rate))
-    return FrequencyResponse(_rms(record.command), rate / command)
+    return FrequencyResponse(rms(record.command), rate / command)
 
 
 def _errors(found: Identified, record: Record) -> tuple[float, float]:
     """Of the plants lagged and coordinated: heading rate less the flown, RMS of means over 20 ms over the command's."""
     lagged, coordinated = (_followed(plant, record) for plant in (found.lagged, found.coordinated))
-    scale = _rms(record.command)
+    scale = rms(record.command)
     return (
-        _rms(means(lagged - record.heading_rate)) / scale,
-        _rms(means(coordinated - record.heading_rate)) / scale,
+        rms(means(lagged - record.heading_rate)) / scale,
+        rms(means(coordinated - record.heading_rate)) / scale,
     )
 
 
@@ -188,7 +189,3 @@ def _followed(plant: Plant, record: Record) -> Array:
         flying.advance(rate, STEP)
         headings.append(flying.state.heading)
     return np.diff(np.unwrap(headings)) / STEP
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values * values)))

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from harness.metric import METRICS
+from harness.metric import METRICS, window_in_words
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.runs.recordings import recording_path
 from harness.runs.store import Stored
 from harness.settings import document, flight_from_document
 from harness.settings.columns import by_column
-from harness.tables import number
+from harness.tables import number, table
 
 
 def story(folder: Path, stored: Stored) -> Iterator[str]:
@@ -45,9 +45,12 @@ def story(folder: Path, stored: Stored) -> Iterator[str]:
             if converged is not None
             else f"It did not settle to {tolerance:g} m."
         )
+    if judged := window_in_words(row["metrics"]):
+        yield judged
     yield ""
-    for name, value in row["metrics"].items():
-        yield f"  {name:30}{number(value):>9}  {METRICS[name].meaning if name in METRICS else ''}"
+    known = ((name, value, METRICS.get(name)) for name, value in row["metrics"].items())  # None: of an earlier version
+    named = ([name, number(value), metric.meaning if metric else ""] for name, value, metric in known)
+    yield from (f"  {line}" for line in table([], named, "lrl"))
     yield ""
     yield "settings that are not the default's:"
     columns = by_column(settings)

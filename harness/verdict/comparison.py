@@ -100,7 +100,7 @@ def _rows(paired: Pairs) -> Iterator[Row]:
         kinds.drop_duplicates().sort_values(["aircraft", "law", "plant"]).itertuples(index=False)
     ):
         those = paired.where((kinds == [aircraft, label, plant]).all(axis=1))
-        for metric in METRICS:
+        for metric in (name for name, declared in METRICS.items() if declared.compared):
             reference, other = those.reference[metric].to_numpy(float), those.other[metric].to_numpy(float)
             if np.isnan(other).all():
                 continue

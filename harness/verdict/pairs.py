@@ -118,7 +118,7 @@ def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     table["overshoot_m"] = table["overshoot_m"].fillna(0.0)
     table["range_error_final_m"] = table["range_error_final_m"].abs()
     for name, metric in METRICS.items():
-        if name == "convergence_time_s" or metric.ideal is None:
+        if name == "convergence_time_s" or not metric.compared:
             continue
         measured = table[name].dropna()
         has_it = table["plant"].isin(set(table["plant"][measured.index]))

@@ -106,7 +106,7 @@ PARTS: tuple[Part, ...] = (
         "range_error_margin_m", _within, consequence=True,
     ),
     Part(
-        "saturation", "saturation", "saturation_fraction", "of the last half",
+        "saturation", "saturation", "saturation_fraction", "of the time",
         "saturation_margin", _within, consequence=True,
     ),
     Part(

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from harness import series
 from harness.studies.paper.experiments import Trace
 
 Array = NDArray[np.float64]
@@ -16,11 +17,8 @@ SETTLED_FOR = 1.0  # s that must be left: less tells nothing of "for good"
 def settled(log: Trace, tolerance: float = CONVERGED, until: float = math.inf) -> float | None:
     """The first tenth of a second after which |r| stays below the tolerance; None when it does not for a second."""
     time = log["time"][log["time"] < until]
-    outside = np.flatnonzero(~(np.abs(log["range_error"][: len(time)]) < tolerance))
-    first = outside[-1] + 1 if outside.size else 0
-    if first >= len(time) or time[-1] - time[first] < SETTLED_FOR:
-        return None
-    return math.ceil(10.0 * float(time[first]) - 1e-6) / 10.0
+    at = series.settling_time(time, log["range_error"][: len(time)], tolerance, SETTLED_FOR)
+    return None if at is None else math.ceil(10.0 * at - 1e-6) / 10.0
 
 
 def settled_before_the_manoeuvres(log: Trace) -> float | None:
@@ -83,7 +81,7 @@ def delay(log: Trace, other: Trace) -> float | None:
 
 def azimuth(log: Trace) -> Array:
     """The azimuth of the aircraft seen from the target, unwrapped, rad."""
-    return np.unwrap(np.arctan2(log["east"] - log["target_east"], log["north"] - log["target_north"]))
+    return series.azimuth(log["north"] - log["target_north"], log["east"] - log["target_east"])
 
 
 def turns(log: Trace, begin: float) -> float:
@@ -93,13 +91,10 @@ def turns(log: Trace, begin: float) -> float:
 
 
 def rms(log: Trace, begin: float = 0.0) -> float:
-    """Of r from `begin` on, m."""
-    r = log["range_error"][log["time"] >= begin]
-    return float(np.sqrt(np.mean(r * r)))
+    """Of r from `begin` on, m; NaN of nothing."""
+    return series.rms(log["range_error"][log["time"] >= begin])
 
 
 def overshoot(log: Trace, until: float = math.inf) -> float:
     """The largest r of the opposite sign after the first crossing, m."""
-    r = log["range_error"][log["time"] <= until]
-    other = np.abs(r[r * r[0] < 0.0])
-    return float(other.max()) if other.size else 0.0
+    return series.overshoot(log["range_error"][log["time"] <= until]) or 0.0
