@@ -1,4 +1,4 @@
-"""Where the airframes are: one folder each, with a JSBSim model and the data it was written from."""
+"""The airframes: one folder each, with a JSBSim model and the data from which it was written."""
 
 import tomllib
 from functools import lru_cache
@@ -9,26 +9,26 @@ FOLDER = Path(__file__).parent
 
 
 class AirframeError(ValueError):
-    """What is wrong with an airframe's files, in one line: `FILE: what`."""
+    """A mistake in the files of an airframe, in one line: `FILE: what is wrong`."""
 
 
 class Limits(NamedTuple):
-    """What an airframe bears. SI, rad."""
+    """The limits of an airframe. SI, rad."""
 
-    slowest: float
+    slowest: float  # airspeed
     design_airspeed: float
-    fastest: float
+    fastest: float  # airspeed
     stall: float  # angle of attack
-    bank: float  # the largest that its inner loop commands
+    bank: float  # the largest bank that its inner loop commands
 
 
 def names() -> list[str]:
-    """The airframes that come with the harness."""
+    """The names of the airframes that are shipped with the harness."""
     return sorted(data.parent.name for data in FOLDER.glob("*/airframe.toml"))
 
 
 def folder(name: str) -> Path:
-    """The folder of an airframe: one of `names()`, or a path to a folder laid out alike. Else FileNotFoundError."""
+    """The folder of an airframe, by its name or by a path to a folder with the same files. Else FileNotFoundError."""
     for candidate in (FOLDER / name, Path(name)):
         if (candidate / "airframe.toml").is_file() and model(candidate).is_file():
             return candidate.resolve()
@@ -36,7 +36,7 @@ def folder(name: str) -> Path:
 
 
 def is_folder(name: str | Path) -> bool:
-    """Whether it is one; what cannot be a path at all (too long, a null in it) is none."""
+    """Whether it is the path of a folder; False also for text that cannot be a path (too long, or with a null)."""
     try:
         return Path(name).is_dir()
     except (OSError, ValueError):
@@ -44,17 +44,17 @@ def is_folder(name: str | Path) -> bool:
 
 
 def model(airframe: Path) -> Path:
-    """The JSBSim model in an airframe's folder."""
+    """The path of the JSBSim model in the folder of an airframe."""
     return airframe / f"{airframe.name}.xml"
 
 
 def identified(airframe: Path) -> Path:
-    """Where `harness identify` keeps what it found of an airframe."""
+    """The path of the file in which `harness identify` keeps its results for an airframe."""
     return airframe / "identified.toml"
 
 
 def data(airframe: Path) -> dict[str, Any]:
-    """An airframe's published data; SI, rad; each number with its source. Raises `AirframeError`."""
+    """The published data of an airframe; SI, rad; each number with its source. Raises `AirframeError`."""
     return _read(airframe / "airframe.toml")
 
 
@@ -64,7 +64,7 @@ def inner_loop(airframe: Path) -> dict[str, Any]:
 
 
 def limits(airframe: Path) -> Limits:
-    """What the airframe bears. Raises `AirframeError` when its files do not say."""
+    """The limits of an airframe. Raises `AirframeError` when its files lack one."""
     published, loop = airframe / "airframe.toml", airframe / "inner_loop.toml"
     return Limits(
         slowest=_number(published, "envelope", "V_min"),
@@ -76,7 +76,7 @@ def limits(airframe: Path) -> Limits:
 
 
 def _number(file: Path, *keys: str) -> float:
-    """The number `v` of an entry."""
+    """The value `v` of an entry, given by its keys."""
     value: Any = _read(file)
     for key in (*keys, "v"):
         value = value.get(key) if isinstance(value, dict) else None
@@ -91,7 +91,7 @@ def _read(file: Path) -> dict[str, Any]:
     except OSError as error:
         raise AirframeError(f"{file}: {error.strerror}") from None
     except ValueError as error:
-        raise AirframeError(f"{file}: no valid TOML: {error}") from None
+        raise AirframeError(f"{file}: not valid TOML: {error}") from None
 
 
 @lru_cache(maxsize=16)

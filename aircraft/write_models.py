@@ -10,7 +10,7 @@ import aircraft
 
 
 def jsbsim_model(airframe: Path) -> str:
-    """The text of the JSBSim model that the data in `airframe` stand for."""
+    """The text of the JSBSim model made from the data in the folder `airframe`."""
     data = aircraft.data(airframe)
     inner_loop = tomllib.loads((airframe / "inner_loop.toml").read_text(encoding="utf-8"))
     template = Environment(

@@ -24,7 +24,7 @@ from harness.margins import Assess
 from harness.metric import METRICS
 from harness.plants.ladder import PLANTS
 from harness.settings.experiment import Experiment
-from harness.settings.table import Setting, table_of
+from harness.settings.table import Setting, schema_of
 from harness.settings.written import written
 from harness.tables import markdown
 from harness.world.target import Segment
@@ -63,7 +63,7 @@ PARTS = (
     *(Part(f'[flight.law] with name = "{name}"', law.value, StandoffLaw) for name, law in LAWS.items()),
     *(
         Part(f"[flight.{key}]", setting.table.make)
-        for key, setting in table_of(Flight).settings.items()
+        for key, setting in schema_of(Flight).settings.items()
         if setting.table and isinstance(setting.table.make, type)
     ),
     Part("An entry of flight.target.segments", Segment),
@@ -93,15 +93,15 @@ def pages() -> Mapping[str, str]:
 
 
 def _top() -> Iterator[str]:
-    rows = ([f"`{key}`", about(Experiment, setting.name)] for key, setting in table_of(Experiment).settings.items())
+    rows = ([f"`{key}`", about(Experiment, setting.name)] for key, setting in schema_of(Experiment).settings.items())
     return markdown(["key", "meaning"], rows)
 
 
 def _settings(part: Part) -> Iterator[str]:
-    elsewhere = table_of(part.inherited).settings if part.inherited else {}
+    elsewhere = schema_of(part.inherited).settings if part.inherited else {}
     defaults = {f.name: f.default for f in fields(part.kind)}
     rows = []
-    for key, setting in table_of(part.kind).settings.items():
+    for key, setting in schema_of(part.kind).settings.items():
         meaning = about(part.kind, setting.name)
         if key in elsewhere or key == "gains" or not meaning:  # a table without a meaning of its own has a section
             continue
@@ -167,7 +167,7 @@ def _ideal(value: float | None) -> str:
 
 
 def _margins() -> Iterator[str]:
-    settings, rows = table_of(Assess).settings, []
+    settings, rows = schema_of(Assess).settings, []
     for key, value in written(Assess()).items():
         rows.append([f"`{key}`", f"{value:.4g}", _UNITS[settings[key].unit.suffix], about(Assess, settings[key].name)])
     return markdown(["key in `[assess]`", "default", "unit", "meaning and source"], rows, "lrl")

@@ -1,4 +1,4 @@
-"""What is wrong with a flight beyond what each of its fields says of itself: rates, wind, target, airframe."""
+"""Checks of a flight that involve more than one field: time steps, wind, target, airframe."""
 
 import math
 from pathlib import Path
@@ -13,52 +13,55 @@ from harness.world.target import Target
 from harness.world.track import TrackError, load_track
 from harness.world.wind import HIGHEST, LOWEST
 
-MOST_PERIODS = 4_000_000  # of a flight: its log takes 2 GB
-MOST_STEPS = 40_000_000  # of a flight: its gusts take 2 GB
+MOST_PERIODS = 4_000_000  # guidance periods of a flight: its log then takes 2 GB
+MOST_STEPS = 40_000_000  # steps of a flight: its gusts then take 2 GB
 
 
 class Problem(NamedTuple):
-    """Something wrong with a value: the dotted name of the field, and what is wrong."""
+    """A mistake in a flight: the dotted name of the field, and what is wrong with its value."""
 
     name: str
     message: str
 
 
 def try_start(flight: Flight) -> None:
-    """Puts the aircraft to its start in the steady wind. Raises `PlantError` when it cannot fly so."""
+    """Starts the flight's plant in the steady wind. Raises `PlantError` when it cannot fly there."""
     plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
 
 
 def problems(flight: Flight) -> list[Problem]:
-    """What makes the flight impossible as it is set, beyond what each field says of itself; empty when it can start."""
-    found = []
+    """All mistakes that involve more than one field; empty for a flight that can be simulated."""
+    mistakes = []
     for name, period, unit_name, unit in (
         ("guidance_period", flight.guidance_period, "step_s", flight.step),
         ("duration", flight.duration, "guidance_period_s", flight.guidance_period),
     ):
         if not _is_multiple(period, unit):
-            found.append(Problem(name, f"{period:g} s is no whole multiple of {unit_name}, {unit:g} s"))
+            mistakes.append(Problem(name, f"{period:g} s is not a whole multiple of {unit_name}, {unit:g} s"))
             break
     for what, period, most in (
         ("guidance periods", flight.guidance_period, MOST_PERIODS),
         ("steps", flight.step, MOST_STEPS),
     ):
-        if not found and flight.duration / period > most:
+        if not mistakes and flight.duration / period > most:
             many = f"takes {flight.duration / period:.3g} {what} of {period:g} s, must be {most:g} at most"
-            found.append(Problem("duration", many))
+            mistakes.append(Problem("duration", many))
     sample, guidance = flight.estimator.period, flight.guidance_period
     if flight.estimator.kind == "ekf":
         if not _is_multiple(sample, flight.step):
-            found.append(Problem("estimator.period", f"{sample:g} s is no whole multiple of step_s, {flight.step:g} s"))
+            not_multiple = f"{sample:g} s is not a whole multiple of step_s, {flight.step:g} s"
+            mistakes.append(Problem("estimator.period", not_multiple))
         elif not (_is_multiple(sample, guidance) or _is_multiple(guidance, sample)):
-            neither = f"{sample:g} s is neither a whole multiple nor a whole part of guidance_period_s, {guidance:g} s"
-            found.append(Problem("estimator.period", neither))
+            neither = (
+                f"{sample:g} s is neither a whole multiple nor a whole fraction of guidance_period_s, {guidance:g} s"
+            )
+            mistakes.append(Problem("estimator.period", neither))
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:
-        found.append(
+        mistakes.append(
             Problem("wind.steady", f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s")
         )
-    found += [
+    mistakes += [
         Problem(f"wind.gusts.{i}.to", f"{gust.to:g} s, must be after from_s, {gust.from_:g} s")
         for i, gust in enumerate(flight.wind.gusts)
         if gust.to <= gust.from_
@@ -66,17 +69,17 @@ def problems(flight: Flight) -> list[Problem]:
     altitude = flight.start.altitude
     if flight.wind.turbulence != "none" and not LOWEST <= altitude <= HIGHEST:
         holds = f"the low-altitude model holds from {LOWEST:g} to {HIGHEST:g} m; the flight starts at {altitude:g} m"
-        found.append(Problem("wind.turbulence", holds))
-    found += _target_problems(flight)
-    found += _aircraft_problems(flight)
-    return found
+        mistakes.append(Problem("wind.turbulence", holds))
+    mistakes += _target_problems(flight)
+    mistakes += _airframe_problems(flight)
+    return mistakes
 
 
 def airframe_of(name: str) -> Path:
-    """The folder of a sound airframe, by its name or itself. Raises ValueError with what is wrong and allowed."""
+    """The folder of an airframe with valid files, by name or path. Raises ValueError with what is wrong and allowed."""
     try:
         airframe = aircraft.folder(name)
-    except (OSError, ValueError):  # no folder, or no path at all
+    except (OSError, ValueError):  # not an airframe, or not even a path
         if aircraft.is_folder(name):
             must = f"{name}: the folder must hold airframe.toml and a JSBSim model, {Path(name).name}.xml"
             raise ValueError(must) from None
@@ -87,7 +90,7 @@ def airframe_of(name: str) -> Path:
     return airframe
 
 
-def _aircraft_problems(flight: Flight) -> list[Problem]:
+def _airframe_problems(flight: Flight) -> list[Problem]:
     try:
         airframe_of(flight.aircraft)
     except ValueError as error:
@@ -103,28 +106,31 @@ def _target_problems(flight: Flight) -> list[Problem]:
     target = flight.target
     if target.track is not None:
         default = Target()
-        found = [
-            Problem(f"target.{name}", "is set beside a track, which alone says where the target is: leave it out")
+        mistakes = [
+            Problem(
+                f"target.{name}", "is set beside a track, which alone defines the motion of the target: leave it out"
+            )
             for name in ("position", "speed", "heading", "segments")
             if getattr(target, name) != getattr(default, name)
         ]
         try:
             end = load_track(Path(target.track)).end
         except TrackError as error:
-            return [*found, Problem("target.track", str(error))]
+            return [*mistakes, Problem("target.track", str(error))]
         if flight.duration > end * (1.0 + 1e-9):
             ends = f"{target.track} ends at {end:g} s, must last as long as duration_s, {flight.duration:g} s"
-            found.append(Problem("target.track", ends))
-        return found
-    found = [
+            mistakes.append(Problem("target.track", ends))
+        return mistakes
+    mistakes = [
         Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
         for i, segment in enumerate(target.segments)
         if segment.to <= segment.from_
     ]
     slowest = min(leg.speed for leg in target.legs())
     if slowest < -1e-9:
-        found.append(Problem("target.segments", f"slow the target down to {slowest:g} m/s, must stay at or above 0"))
-    return found
+        slow = f"slow the target down to {slowest:g} m/s, must keep its speed at or above 0"
+        mistakes.append(Problem("target.segments", slow))
+    return mistakes
 
 
 def _is_multiple(period: float, unit: float) -> bool:

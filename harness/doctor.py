@@ -1,4 +1,4 @@
-"""The self-tests of an installation: versions, wind and units on the JSBSim that is really there."""
+"""Self-tests of an installation: versions of packages, and wind and units of the installed JSBSim."""
 
 import math
 import platform
@@ -21,15 +21,15 @@ UNIT_TOLERANCE = 1e-4  # relative: JSBSim rounds its factor for kg m^2
 
 
 class SelfTest(NamedTuple):
-    """One thing examined."""
+    """The result of one self-test."""
 
-    what: str
-    measured: str
-    sound: bool
+    name: str
+    measured: str  # in words, with units
+    passed: bool
 
 
 def examine() -> Iterator[SelfTest]:
-    """Everything the doctor looks at, one by one."""
+    """Runs all self-tests, one at a time."""
     yield SelfTest("python", platform.python_version(), True)
     for package in PACKAGES:
         try:
@@ -42,12 +42,12 @@ def examine() -> Iterator[SelfTest]:
         error = max(wind_triangle_error(airframe, start, Air(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0)))
         yield SelfTest(f"wind, {name}", f"v_ground - v_air - wind: {error:.1e} m/s", error < WIND_TOLERANCE)
         units = compare_units(airframe)
-        what, error = max(((u.what, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
+        what, error = max(((u.quantity, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
         yield SelfTest(f"units, {name}", f"{len(units)} quantities, worst {error:.1e} ({what})", error < UNIT_TOLERANCE)
 
 
 def wind_triangle_error(airframe: Path, start: Start, air: Air) -> float:
-    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air from the body's axes."""
+    """The largest component of v_ground - v_air - wind after 2 s of flight, m/s; v_air is JSBSim's, in body axes."""
     flying = SixDof(airframe, 0.005, True).start(start, air)
     flying.advance(0.0, 2.0)
     fdm, state = flying.fdm, flying.state
@@ -71,15 +71,15 @@ def _body_to_ned(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
 
 
 class UnitCheck(NamedTuple):
-    """One quantity in SI: as the airframe's data have it, and as JSBSim keeps it in other units."""
+    """One quantity in SI: from the airframe's data, and from JSBSim, converted."""
 
-    what: str
+    quantity: str
     data: float
     jsbsim: float
 
 
 def compare_units(airframe: Path) -> list[UnitCheck]:
-    """Mass, inertia, geometry, airspeed and altitude of a trimmed airframe, each by both."""
+    """Mass, inertia, geometry, airspeed and altitude of a trimmed airframe, from its data and from JSBSim."""
     data = aircraft.data(airframe)
     mass, ref = data["mass"], data["ref"]
     fdm = load(airframe, 0.005)

@@ -1,4 +1,4 @@
-"""Can the circle be held? The heading rate that holding it takes, against the limit; and what to know beforehand."""
+"""Feasibility: the heading rate needed to hold the circle, against its limit; and warnings before a flight."""
 
 import math
 
@@ -11,7 +11,7 @@ from harness.world.target import TargetState
 
 
 def target_states(flight: Flight) -> list[TargetState]:
-    """The target during the flight, at its breakpoints and twice a second."""
+    """The states of the target during the flight, at its breakpoints and twice a second; one state if it is at rest."""
     at = flight.target.start()
     if flight.target.track is None and not flight.target.speed and not flight.target.segments:
         return [at(0.0)]  # at rest
@@ -26,9 +26,10 @@ def relative_speed(flight: Flight) -> float:
 
 
 def needed_rate(flight: Flight) -> float:
-    """The largest rate that holding the circle takes of what the law limits, rad/s.
+    """The largest rate needed to hold the circle, rad/s, of the quantity that the law limits.
 
-    Heading rate: (v_a + w)^2 / (v_a R_d). Course rate, which a tail wind raises less: (v_a + w) / R_d at rest.
+    The heading rate is (v_a + w)^2 / (v_a R_d), with w the relative speed. The course rate needed is smaller: with a
+    target at rest it is (v_a + w) / R_d.
     """
     v_a = flight.start.airspeed
     if flight.law.command == "course_rate":
@@ -38,12 +39,12 @@ def needed_rate(flight: Flight) -> float:
 
 
 def feasibility_margin(flight: Flight) -> float:
-    """The limit minus what holding the circle takes, rad/s; negative: the circle cannot be held."""
+    """The limit minus the rate needed to hold the circle, rad/s; negative if the circle cannot be held."""
     return flight.law.max_heading_rate - needed_rate(flight)
 
 
 def feasibility_line(flight: Flight) -> str:
-    """Whether the circle can be held, and by what margin."""
+    """One line: whether the circle can be held, and by what margin."""
     margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
     of = " of course" if flight.law.command == "course_rate" else ""
     verdict = "feasible" if margin >= 0 else "INFEASIBLE"
@@ -54,27 +55,29 @@ def feasibility_line(flight: Flight) -> str:
 
 
 def warnings(flight: Flight) -> list[str]:
-    """What the user should know before trusting the flight; it is flown all the same."""
-    said = []
+    """Sentences that a user should know before trusting the flight, which can be flown all the same."""
+    sentences = []
     v_a = flight.start.airspeed
     fastest = max(math.hypot(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight))
     ratio = (fastest + math.hypot(*flight.wind.steady)) / v_a
     if ratio >= 1.0:
-        said.append(f"Remark 1 asks for v_t + v_w < v_a; here it is {ratio * v_a:.3g} m/s of {v_a:g} m/s")
+        sentences.append(
+            f"Remark 1 requires v_t + v_w < v_a; here v_t + v_w is {ratio * v_a:.3g} m/s and v_a is {v_a:g} m/s"
+        )
     if feasibility_margin(flight) < 0:
-        said.append("the circle is infeasible: the limit is below what holding it takes")
+        sentences.append("the circle is infeasible: holding it takes more than the limit")
     plant = PLANTS[flight.plant]
     setup = setup_of(flight)
-    said += plant.warnings(setup)
+    sentences += plant.warnings(setup)
     if plant.banks:
         limits = aircraft.limits(setup.airframe)
         if not limits.slowest <= v_a <= limits.fastest:
             envelope = f"{limits.slowest:g} to {limits.fastest:g} m/s"
-            said.append(f"{v_a:g} m/s is outside the airframe's envelope, {envelope}")
+            sentences.append(f"{v_a:g} m/s is outside the airframe's envelope, {envelope}")
         needed = bank_of_turn(v_a, flight.law.max_heading_rate)
         if needed > limits.bank:
-            said.append(
-                f"the heading-rate limit takes {math.degrees(needed):.0f} deg of bank, the inner loop allows "
+            sentences.append(
+                f"the heading-rate limit needs {math.degrees(needed):.0f} deg of bank, the inner loop allows "
                 f"{math.degrees(limits.bank):.0f}"
             )
-    return said + flight.law.broken_conditions(ratio)
+    return sentences + flight.law.broken_conditions(ratio)

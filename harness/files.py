@@ -1,4 +1,4 @@
-"""A file that is written whole or not at all."""
+"""Writing a file completely or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A name beside the path to write to, which becomes the path at the end. OSError of the path when that fails."""
+    """Yields a temporary path to write to, and moves that to `path` at the end. Raises OSError that names `path`."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         yield partial

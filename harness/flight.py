@@ -1,4 +1,4 @@
-"""A flight as a value: everything that decides it."""
+"""A flight as a value: all settings that decide it."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -25,10 +25,10 @@ class InnerLoop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricSettings:
-    """What counts as converged, and as lost."""
+    """Thresholds of the metrics, and the range beyond which the target is lost."""
 
-    tolerance: Annotated[Metres, Gt(0), About("|range error| below it for good is convergence")] = 1.0
-    monitoring_range: Annotated[Metres | None, Gt(0), About("beyond it the target is lost")] = None
+    tolerance: Annotated[Metres, Gt(0), About("the flight has converged once |range error| stays below it")] = 1.0
+    monitoring_range: Annotated[Metres | None, Gt(0), About("distance beyond which the target is lost")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,11 +46,13 @@ class Flight:
     law: Law
     aircraft: Annotated[str, About("an airframe by name, or its folder")] = "ultra_stick_25e"
     duration: Annotated[Seconds, Gt(0), Le(1e6), About("length of the flight")] = 100.0
-    guidance_period: Annotated[Seconds, Gt(0), Le(1e3), About("the law's command is held in between")] = 0.05
+    guidance_period: Annotated[
+        Seconds, Gt(0), Le(1e3), About("time between two commands of the law; a command is held until the next")
+    ] = 0.05
     step: Annotated[
-        Seconds, Ge(1e-5), Le(0.05), About("of the 6-DOF simulation; periods are whole multiples of it")
+        Seconds, Ge(1e-5), Le(0.05), About("step of the 6-DOF simulation; all periods are whole multiples of it")
     ] = 0.005
-    seed: Annotated[int, Ge(0), Le(10**15), About("of everything random")] = 0
+    seed: Annotated[int, Ge(0), Le(10**15), About("seed of everything random")] = 0
     start: Start = field(default_factory=Start)
     target: Target = field(default_factory=Target)
     wind: Wind = field(default_factory=Wind)
@@ -65,7 +67,7 @@ class Flight:
 
 
 def setup_of(flight: Flight) -> Setup:
-    """What the flight's plant is made from. FileNotFoundError without the airframe."""
+    """What the flight's plant is made from. Raises FileNotFoundError for an unknown airframe."""
     airframe = aircraft.folder(flight.aircraft)
     return Setup(airframe, flight.start.airspeed, flight.step, flight.inner_loop.rate_trim)
 
@@ -76,7 +78,7 @@ def plant_of(flight: Flight) -> Plant:
 
 
 def air_of(flight: Flight) -> Air:
-    """The air that the flight meets: the same for every plant, law and guidance period."""
+    """The air of the flight: the same for every plant, law and guidance period."""
     return flight.wind.start(
         airspeed=flight.start.airspeed,
         altitude=flight.start.altitude,

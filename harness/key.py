@@ -14,36 +14,36 @@ from harness.flight import Flight
 from harness.plants.ladder import PLANTS
 from harness.settings import document
 
-PHYSICS_VERSION = 3  # of the plants, the wind and the loop: raised whenever a change there moves a trajectory
-METRICS_VERSION = 3  # of what a log is judged by: raised whenever a change there moves a metric
+PHYSICS_VERSION = 3  # of plants, wind and loop: raised whenever a change there moves a trajectory
+METRICS_VERSION = 3  # of the metrics: raised whenever a change moves the value of one
 
 
 class Version(NamedTuple):
-    """All that decides a flight, and how it is judged, beside its settings."""
+    """Everything that decides a flight and its metrics, besides its settings."""
 
-    number: str  # a hash of it
-    decides: Mapping[str, Any]  # of the physics, of the libraries, and a hash of each file's content
+    number: str  # a hash of `decides`
+    decides: Mapping[str, Any]  # versions of physics, metrics and libraries, and a hash of each file's content
 
 
 class Identity(NamedTuple):
-    """What makes a flight this one."""
+    """A flight's key, and what it is a hash of."""
 
-    key: str  # a hash of both
+    key: str  # a hash of settings and version
     settings: Mapping[str, Any]  # a [flight] table in file units
     version: Version
 
 
 def identity(flight: Flight) -> Identity:
-    """What makes the flight this one. OSError when a file that it reads is gone."""
+    """The key of a flight with its settings and version. Raises OSError when a file that it reads is missing."""
     settings, version = document(flight), version_of(flight)
-    hashed_ones = settings
-    if settings["target"]["track"] is not None:  # its content counts, not where it lies
-        hashed_ones = {**settings, "target": {**settings["target"], "track": "content"}}
-    return Identity(hashed({"settings": hashed_ones, "version": version.number}), settings, version)
+    hashed_settings = settings
+    if settings["target"]["track"] is not None:  # its content counts, not its path
+        hashed_settings = {**settings, "target": {**settings["target"], "track": "content"}}
+    return Identity(hashed({"settings": hashed_settings, "version": version.number}), settings, version)
 
 
 def version_of(flight: Flight) -> Version:
-    """All that decides the flight beside its settings, as it is now. OSError when a file is gone."""
+    """Everything besides the settings that decides the flight, as it is now. Raises OSError when a file is missing."""
     libraries = {
         "plant": PLANTS[flight.plant].libraries,
         "turbulence": ("numpy", "scipy") if flight.wind.turbulence != "none" else (),
@@ -55,25 +55,25 @@ def version_of(flight: Flight) -> Version:
 
 
 def flight_key(flight: Flight) -> str:
-    """32 hex digits, equal exactly when the same flight would be flown, and judged alike."""
+    """32 hex digits, equal exactly for flights that have the same trajectory and the same metrics."""
     return identity(flight).key
 
 
 def files(flight: Flight) -> dict[str, Path]:
-    """Every file whose content decides the flight, by a name that says what it is for."""
+    """The path of every file whose content decides the flight, by a name for its purpose, such as `target/track`."""
     return dict(_paths(flight.plant, flight.aircraft, flight.target.track))
 
 
 @lru_cache(maxsize=256)
 def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, Path], ...]:
     on_board = Path(autopilot.__file__).parent
-    found = {f"autopilot/{path.name}": path for path in sorted(on_board.glob("*.py"))}
+    paths = {f"autopilot/{path.name}": path for path in sorted(on_board.glob("*.py"))}
     if track is not None:
-        found["target/track"] = Path(track)
+        paths["target/track"] = Path(track)
     kind = PLANTS[plant]
     if kind.has_airframe:
-        found |= kind.files(aircraft.folder(name))
-    return tuple(found.items())
+        paths |= kind.files(aircraft.folder(name))
+    return tuple(paths.items())
 
 
 @lru_cache(maxsize=256)
@@ -83,7 +83,7 @@ def _version(
     files: tuple[tuple[str, Path, int], ...],
     libraries: tuple[tuple[str, tuple[str, ...]], ...],
 ) -> Version:
-    """Of files by name, path and time of change, and of the libraries for each purpose."""
+    """The version, from files as (name, path, modification time) and the libraries by purpose."""
     decides = {
         "physics": physics,
         "metrics": metrics,
@@ -94,11 +94,11 @@ def _version(
 
 
 def hashed(content: object) -> str:
-    """32 hex digits of what JSON can hold, whatever the order of its keys."""
+    """A hash, 32 hex digits, of a value that JSON can hold; the order of keys does not matter."""
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
 
 
 def content_hash(content: bytes) -> str:
-    """32 hex digits of a file's content."""
+    """A hash, 32 hex digits, of the content of a file."""
     return hashlib.blake2b(content, digest_size=16).hexdigest()

@@ -1,4 +1,4 @@
-"""What a flight leaves behind."""
+"""The log of a flight: one row per guidance period, a column per quantity."""
 
 import hashlib
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# The loop writes the first columns, row by row; the rest follows from the flight as a whole.
-GUIDANCE_COLUMNS = ("heading_rate_command", "range_error_seen", *Guidance._fields[2:])  # from what the law knew
+# The loop writes the first columns row by row; the others are computed at the end of the flight.
+GUIDANCE_COLUMNS = ("heading_rate_command", "range_error_seen", *Guidance._fields[2:])  # computed by the law
 LOOP_COLUMNS = ("time", *State._fields, *TargetState._fields, *GUIDANCE_COLUMNS)
-# The target as the law knew it: the truth itself, with variances of NaN, where nothing is estimated. An innovation is
-# NaN but in the rows with a new measurement; of several since the row before, it is the latest's.
+# The target as the law knew it: without a filter the truth, with NaN as its variances. The innovation is that of the
+# latest measurement since the row before, NaN if there was none.
 SEEN_COLUMNS = (
     *(f"{name}_seen" for name in Estimate._fields[:4]),
     *Estimate._fields[4:],
     *(f"innovation_{name}" for name in Measurement._fields),
 )
 COLUMNS = (*LOOP_COLUMNS, "range_error", *SEEN_COLUMNS)  # the range error is the true one
-# What the digest is made of: how aircraft and target moved, and the command between them. Named one by one, so that a
-# column added to the log changes no digest.
+# The columns of the digest: motion of aircraft and target, and the command. They are listed by name, so that a new
+# column of the log does not change any digest.
 TRAJECTORY = (
     "north", "east", "altitude", "velocity_north", "velocity_east", "velocity_down", "airspeed", "heading",
     "heading_rate", "bank", "roll_rate", "pitch", "yaw", "pitch_rate", "yaw_rate", "aileron", "elevator", "rudder",
@@ -94,7 +94,7 @@ class FlightLog:
     def digest(self) -> str:
         """32 hex digits: a hash of the trajectory to the last bit, and of the outcome. Equal digests, equal flights."""
         content = hashlib.sha256(repr((TRAJECTORY, self.outcome.value)).encode())
-        for begin in range(0, len(self.table), _ROWS_AT_ONCE):  # so few that they stay in the processor's cache
+        for begin in range(0, len(self.table), _ROWS_AT_ONCE):  # few enough to stay in the processor's cache
             rows = self.table[begin : begin + _ROWS_AT_ONCE, _TRAJECTORY]
             content.update(np.ascontiguousarray(rows + 0.0).data)  # + 0.0: minus zero is zero
         return content.hexdigest()[:32]

@@ -1,4 +1,4 @@
-"""Where results come from: code, packages, machine, command."""
+"""Provenance: the command, code, packages and machine that made results."""
 
 import json
 import platform
@@ -16,7 +16,7 @@ DISTRIBUTION = "standoff-harness"
 
 
 class Provenance(NamedTuple):
-    """What one `harness run` was."""
+    """The provenance of one `harness run`."""
 
     started: str  # UTC, ISO 8601
     command: str
@@ -25,15 +25,15 @@ class Provenance(NamedTuple):
     settings: str  # the file's text
     title: str
     question: str
-    git_commit: str | None  # None: the code is in no Git checkout
-    git_dirty: bool | None  # files changed since the commit
+    git_commit: str | None  # None if the code is not in a Git checkout
+    git_dirty: bool | None  # whether files differ from the commit
     packages: str  # JSON: versions by name
     platform: str
     python: str
 
 
 def provenance(file: Path, title: str, question: str) -> Provenance:
-    """Of the run that begins now."""
+    """The provenance of the run of `file` that begins now."""
     commit, changes = _git("rev-parse", "HEAD"), _git("status", "--porcelain")
     return Provenance(
         now(),
@@ -52,25 +52,25 @@ def provenance(file: Path, title: str, question: str) -> Provenance:
 
 
 def now() -> str:
-    """UTC, to the second."""
+    """The time now: UTC, ISO 8601, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def packages() -> dict[str, str]:
-    """The versions of the harness and of the libraries that it asks for."""
+    """The versions of the harness and of the libraries that it requires, by name."""
     asked = [requirement for requirement in requires(DISTRIBUTION) or () if "extra ==" not in requirement]
     names = [DISTRIBUTION, *(re.split(r"[^\w.-]", requirement)[0] for requirement in asked)]
-    found = {}
+    versions = {}
     for name in names:
         try:
-            found[name] = version(name)
+            versions[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            versions[name] = "not installed"
+    return versions
 
 
 def _git(*words: str) -> str | None:
-    """What Git says of the harness's own checkout; None when it is in none."""
+    """The output of a Git command in the harness's own checkout; None if there is no checkout, or it fails."""
     if not (_HERE / ".git").exists():
         return None
     try:

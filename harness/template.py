@@ -1,10 +1,10 @@
-"""The template of a page or a document, from the folder of the package that fills it in."""
+"""Jinja templates of pages and documents, which lie beside the code that fills them in."""
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 
 def template(package: str, name: str) -> Template:
-    """The Jinja template of this name; what goes into an HTML page is escaped, a name left unfilled is an error."""
+    """The template `name` in the folder of `package`. Values in HTML are escaped; an undefined name is an error."""
     return Environment(
         loader=PackageLoader(package, "."),
         autoescape=".html" in name,

@@ -70,7 +70,7 @@ BAD = [
     ("law.name=nftms", "flight.law.name", "did you mean 'nftsm'"),
     ("duration_s=-5", "flight.duration_s", "> 0"),
     ('duration_s="5"', "flight.duration_s", "a number"),
-    ("guidance_period_s=0.052", "flight.guidance_period_s", "no whole multiple of step_s, 0.005 s"),
+    ("guidance_period_s=0.052", "flight.guidance_period_s", "not a whole multiple of step_s, 0.005 s"),
     ("wind.steady_mps=[13.0, 0.0]", "flight.wind.steady_mps", "below the airspeed, 13 m/s"),
     ("aircraft=cessna", "flight.aircraft", "skywalker_x8"),
     ("start.airspeed_mps=1e300", "flight.start.airspeed_mps", "of 1e+09 at most in size"),
@@ -115,7 +115,7 @@ def test_what_the_airframe_cannot_do_is_one_line_and_exit_code_2(file: Path, set
     [
         ("plane.xml", "aero/q-hat </property>", "aero/q-hut </property>", "plane.xml: unknown properties aero/q-hut"),
         ("plane.xml", "</fdm_config>", "", "plane.xml: "),
-        ("airframe.toml", "[meta]", "[meta", "airframe.toml: no valid TOML"),
+        ("airframe.toml", "[meta]", "[meta", "airframe.toml: not valid TOML"),
         ("airframe.toml", "alpha_stall", "alpha_stal", "airframe.toml: aero.alpha_stall.v must be a number"),
         ("inner_loop.toml", "[limit]", "[limits]", "inner_loop.toml: limit.bank-rad.v must be a number"),
         ("inner_loop.toml", "", None, "inner_loop.toml: No such file"),

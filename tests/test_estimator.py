@@ -269,9 +269,9 @@ def test_a_measurement_period_must_fit_the_guidance_period_and_the_step() -> Non
 
     assert told(0.5, 0.05) == told(0.1, 0.5) == told(0.5, 0.5) == told(0.5, 0.2, "truth") == []
     assert told(0.5, 0.2) == [
-        "estimator.period: 0.5 s is neither a whole multiple nor a whole part of guidance_period_s, 0.2 s"
+        "estimator.period: 0.5 s is neither a whole multiple nor a whole fraction of guidance_period_s, 0.2 s"
     ]
-    assert told(0.501, 0.05) == ["estimator.period: 0.501 s is no whole multiple of step_s, 0.005 s"]
+    assert told(0.501, 0.05) == ["estimator.period: 0.501 s is not a whole multiple of step_s, 0.005 s"]
 
 
 @pytest.mark.parametrize(

@@ -205,18 +205,18 @@ def test_a_mistake_in_an_override_is_told_as_it_was_typed(write: Write) -> None:
     ]
     assert mistakes(path, "plant", "law.name.x=1") == [
         "--set plant: must be KEY=VALUE, as in law.gains=paper_1",
-        "--set law.name.x=1: flight.law.name is no table",
+        "--set law.name.x=1: flight.law.name is not a table",
     ]
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[flight]\nplant = kinematic\n", "a.toml:2: no valid TOML: Invalid value"),
-        ("\n[flight", "a.toml:2: no valid TOML: Expected ']' at the end of a table declaration"),
-        (b"# \xc3\xa4\n# \xff\n", "a.toml:2: no text in UTF-8"),
+        ("[flight]\nplant = kinematic\n", "a.toml:2: not valid TOML: Invalid value"),
+        ("\n[flight", "a.toml:2: not valid TOML: Expected ']' at the end of a table declaration"),
+        (b"# \xc3\xa4\n# \xff\n", "a.toml:2: not text in UTF-8"),
         ("", "a.toml:1: flight: is missing, must be a table"),
-        (f"{SHORTEST}[matrix]\nseed = [1]\n", "a.toml:5: matrix: many flights, not one: use `harness run`"),
+        (f"{SHORTEST}[matrix]\nseed = [1]\n", "a.toml:5: matrix: is many flights, must be one: use `harness run`"),
     ],
 )
 def test_a_file_that_is_no_flight_is_told_in_one_line(write: Write, text: str | bytes, told: str) -> None:

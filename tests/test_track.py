@@ -115,7 +115,7 @@ def test_a_mistake_is_one_line_with_its_place(tmp_path: Path, lines: list[str], 
 
 def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_bytes(b"time_s\xff")
-    for name, told in (("a.csv", "no text in UTF-8"), ("b.csv", "No such file or directory"), (".", "Is a directory")):
+    for name, told in (("a.csv", "not text in UTF-8"), ("b.csv", "No such file or directory"), (".", "Is a directory")):
         with pytest.raises(TrackError, match=told):
             load_track(tmp_path / name)
 
@@ -182,7 +182,7 @@ def test_feasibility_and_remark_1_count_the_tracks_speed(circle: Path) -> None:
     assert relative_speed(flight(circle)) == pytest.approx(3.0, rel=1e-3)
     assert relative_speed(replace(flight(circle), wind=Wind(steady=(0.0, -2.0)))) == pytest.approx(5.0, rel=1e-3)
     said = warnings(replace(flight(circle), wind=Wind(steady=(10.5, 0.0))))
-    assert any(text.startswith("Remark 1 asks for v_t + v_w < v_a; here it is 13.5 m/s") for text in said)
+    assert any(text.startswith("Remark 1 requires v_t + v_w < v_a; here v_t + v_w is 13.5 m/s") for text in said)
 
 
 def test_the_key_counts_a_tracks_content_not_its_place(circle: Path, tmp_path: Path) -> None:

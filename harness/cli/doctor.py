@@ -14,8 +14,8 @@ def doctor() -> None:
     from harness.doctor import examine
 
     sound = True
-    for finding in examine():
-        sound = sound and finding.sound
-        click.echo(f"{'ok  ' if finding.sound else 'BAD '} {finding.what:32} {finding.measured}")
+    for test in examine():
+        sound = sound and test.passed
+        click.echo(f"{'ok  ' if test.passed else 'BAD '} {test.name:32} {test.measured}")
     click.echo("sound" if sound else "NOT SOUND: results of this installation cannot be trusted")
     raise SystemExit(0 if sound else 1)

@@ -58,12 +58,12 @@ def _margins() -> Iterator[str]:
 
     from autopilot.quantities import About
     from harness.margins import Assess
-    from harness.settings.table import table_of
+    from harness.settings.table import schema_of
     from harness.settings.written import written
 
     hints = get_type_hints(Assess, include_extras=True)
     for key, value in written(Assess()).items():
-        hint = hints[table_of(Assess).settings[key].name]
+        hint = hints[schema_of(Assess).settings[key].name]
         about = next(mark.text for mark in get_args(hint) if isinstance(mark, About))
         yield f"{f'assess.{key} = {value:.4g}':50} {about}"
 

@@ -21,7 +21,7 @@ _SETTLES = 1.0  # s: the viewer fetches what it shows after it has drawn without
 _GREETINGS = 6.0  # s: how long it covers a corner with what it has to say at its start
 
 
-class Picture(NamedTuple):
+class Screenshot(NamedTuple):
     """Tabs of one recording at one time, s."""
 
     name: str
@@ -69,17 +69,20 @@ def _shrink(path: Path) -> None:
     small.save(path, optimize=True)
 
 
-def _pictures() -> Iterator[tuple[Picture, Mapping[str, FlightLog]]]:
+def _pictures() -> Iterator[tuple[Screenshot, Mapping[str, FlightLog]]]:
     moving = {"target": {"speed_mps": 2.0, "heading_deg": 20.0}, "estimator": {"kind": "ekf"}}
     gusty = {"wind": {"steady_mps": [2.0, 0.0], "turbulence": "light"}}
     one = _flown("sixdof", 10.0, moving | gusty)
-    yield Picture("one-flight", "A moving target, estimated, in light turbulence", 60.0, TABS), {"ultra_stick_25e": one}
+    yield (
+        Screenshot("one-flight", "A moving target, estimated, in light turbulence", 60.0, TABS),
+        {"ultra_stick_25e": one},
+    )
     windy = {"wind": {"steady_mps": [3.0, 0.0]}}
     plants = ("kinematic", "lagged", "coordinated", "sixdof")
     pair = {plant: _flown(plant, 8.0, windy) for plant in ("kinematic", "sixdof")}
-    yield Picture("pair", "3 m/s of wind, NFTSM_1", 27.0, ("overview", "cursor")), pair
+    yield Screenshot("pair", "3 m/s of wind, NFTSM_1", 27.0, ("overview", "cursor")), pair
     four = {plant: _flown(plant, 10.0, gusty) for plant in plants}
-    yield Picture("plants", "The same flight on each plant, light turbulence", 40.0, ("overview",)), four
+    yield Screenshot("plants", "The same flight on each plant, light turbulence", 40.0, ("overview",)), four
 
 
 def _flown(plant: str, limit_deg_s: float, others: Mapping[str, object]) -> FlightLog:

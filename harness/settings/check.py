@@ -1,4 +1,4 @@
-"""The check of a table that a file holds, with pydantic, and what is made of it."""
+"""Checks a table of a settings file with pydantic, and builds the value that it describes."""
 
 import math
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from harness.settings.mistake import LARGEST, Places, mistake, settings_error
-from harness.settings.table import Setting, Table
+from harness.settings.table import Setting, TableSchema
 
 
-def checked(table: Table, document: Mapping[str, object], place: Places) -> object:
-    """What the document makes, in SI. Raises `SettingsError` with every mistake."""
+def checked(table: TableSchema, document: Mapping[str, object], place: Places) -> object:
+    """The value that the document describes, in SI. Raises `SettingsError` with every mistake; `place` locates keys."""
     try:
         return _made(table, _model(table).model_validate(document))
     except ValidationError as error:
@@ -31,37 +31,37 @@ def checked(table: Table, document: Mapping[str, object], place: Places) -> obje
 
 
 @cache
-def _model(table: Table) -> type[BaseModel]:
+def _model(table: TableSchema) -> type[BaseModel]:
     keys: dict[str, Any] = {key: (_type(s), ... if s.required else None) for key, s in table.settings.items()}
     return create_model("Table", __config__=ConfigDict(extra="ignore" if table.open else "forbid"), **keys)
 
 
-def _made(table: Table, model: BaseModel) -> object:
+def _made(table: TableSchema, model: BaseModel) -> object:
     given = model.model_fields_set
     return table.make(**{s.name: getattr(model, key) for key, s in table.settings.items() if key in given})
 
 
 def _sized(number: float) -> float:
-    """The number, unless it is so large that what is computed from it would not be finite."""
+    """The number; an error if it is so large that results would not be finite."""
     if LARGEST < abs(number) < math.inf:
         raise PydanticCustomError("too_large", "too large")
     return number
 
 
 def _type(setting: Setting) -> Any:
-    """The annotation that pydantic checks the value by, and makes it SI."""
-    one: Any
+    """The annotation by which pydantic checks the value of a setting and converts it to SI."""
+    kind: Any
     if table := setting.table:
-        one = Annotated[_model(table), AfterValidator(lambda model: _made(table, model))]
+        kind = Annotated[_model(table), AfterValidator(lambda model: _made(table, model))]
     elif setting.kind is float:
         si = AfterValidator(lambda number: number * setting.unit.si)
-        one = Annotated[float, Strict(), AllowInfNan(setting.infinite), *setting.bounds, AfterValidator(_sized), si]
+        kind = Annotated[float, Strict(), AllowInfNan(setting.infinite), *setting.bounds, AfterValidator(_sized), si]
         if setting.infinite:  # JSON has no infinity
-            one = Annotated[one, BeforeValidator(lambda given: math.inf if given == "inf" else given)]
+            kind = Annotated[kind, BeforeValidator(lambda given: math.inf if given == "inf" else given)]
     elif setting.kind in (int, bool, str):
-        one = Annotated[setting.kind, Strict(), *setting.bounds]
+        kind = Annotated[setting.kind, Strict(), *setting.bounds]
     else:
-        one = setting.kind
+        kind = setting.kind
     if setting.length is not None:
-        one = GenericAlias(tuple, (one, ...) if setting.length is ... else (one,) * setting.length)
-    return one | None if setting.optional else one
+        kind = GenericAlias(tuple, (kind, ...) if setting.length is ... else (kind,) * setting.length)
+    return kind | None if setting.optional else kind

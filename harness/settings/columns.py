@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from harness.flight import Flight
-from harness.settings.table import table_of
+from harness.settings.table import schema_of
 
 _LISTS_OF_TABLES = ("segments", "gusts")
 
 
 def is_setting(column: str) -> bool:
     """Whether a column of results is a setting: a key, or below a table, of [flight]. Everything else is a result."""
-    return column.partition(".")[0] in table_of(Flight).settings
+    return column.partition(".")[0] in schema_of(Flight).settings
 
 
 def by_column(settings: Mapping[str, Any], within: str = "") -> dict[str, Any]:
-    """Every setting by its dotted key. A list of tables is JSON text; infinity, a text in JSON, is a number again."""
+    """The settings of a flight by dotted key. A list of tables becomes JSON text; the text "inf" becomes infinity."""
     columns: dict[str, Any] = {}
     for key, value in settings.items():
         if isinstance(value, dict):

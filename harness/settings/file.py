@@ -1,4 +1,4 @@
-"""A settings file as it was read: what it says, and where; and the flight in it."""
+"""A settings file: its content, the line of each key, and the flight that it describes."""
 
 import re
 import sys
@@ -20,35 +20,37 @@ from harness.settings.experiment import CUSTOM, Experiment, document_table
 from harness.settings.former_names import without_former_names
 from harness.settings.keys import file_key, put
 from harness.settings.mistake import Mistake, Place, Places, settings_error
-from harness.settings.table import Table, table_of
+from harness.settings.table import TableSchema, schema_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
 
 
 @dataclass(frozen=True, slots=True)
 class SettingsFile:
-    """A file as it was read, not checked yet."""
+    """A settings file that has been read but not checked."""
 
     path: Path
-    document: Mapping[str, object]  # in file units, overrides merged
-    lines: Mapping[Key, int]
-    overrides: Mapping[Key, str]  # the texts KEY=VALUE
+    document: Mapping[str, object]  # in file units, with the overrides
+    lines: Mapping[Key, int]  # the line of each key, from 1
+    overrides: Mapping[Key, str]  # by key, the text KEY=VALUE that sets it
 
     def flight(self) -> Flight:
         """The file's one flight. Raises `SettingsError`."""
         matrix = self.document.get("matrix")
         if matrix and isinstance(matrix, dict):
-            raise SettingsError([f"{self._place(('matrix',)).text}: matrix: many flights, not one: use `harness run`"])
+            raise SettingsError(
+                [f"{self._place(('matrix',)).text}: matrix: is many flights, must be one: use `harness run`"]
+            )
         return _flight(self.document, self._place, self.path.parent)
 
     def experiment(self) -> Experiment:
-        """Everything in the file; what its tables hold stays unchecked. Raises `SettingsError`."""
-        experiment = checked(table_of(Experiment), self.document, self._place)
+        """Everything in the file; the content of [flight] and of [matrix] stays unchecked. Raises `SettingsError`."""
+        experiment = checked(schema_of(Experiment), self.document, self._place)
         assert isinstance(experiment, Experiment)
         return experiment
 
     def assess(self) -> Assess:
-        """The margins of the verdict alone, whatever else the file says. Raises `SettingsError`."""
-        only = Table({"assess": table_of(Experiment).settings["assess"]}, dict, open=True)
+        """The margins of the verdict, from the table [assess] alone. Raises `SettingsError`."""
+        only = TableSchema({"assess": schema_of(Experiment).settings["assess"]}, dict, open=True)
         made = checked(only, self.document, self._place)
         assert isinstance(made, dict)
         assess = made.get("assess", Assess())
@@ -56,7 +58,7 @@ class SettingsFile:
         return assess
 
     def locate(self, name: str) -> str:
-        """Where a field is set, by its dotted name: `FILE:LINE: flight.start.airspeed_mps` for `start.airspeed`."""
+        """Place and key of a field by its dotted name: `FILE:LINE: flight.start.airspeed_mps` for `start.airspeed`."""
         key = file_key(name)
         return f"{self._place(key).text}: {dotted(key)}"
 
@@ -85,21 +87,21 @@ def load_flight(path: str | Path, overrides: Sequence[str] = ()) -> Flight:
 
 
 def read_settings(path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
-    """A file with `overrides` merged into its [flight]. Raises `SettingsError` for a text that is no TOML."""
+    """The file with `overrides` merged into its [flight]. Raises `SettingsError` if it is unreadable or not TOML."""
     return settings_from_text(_text(path), path, overrides)
 
 
 def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
-    """The same of a file's text, as a store keeps it."""
+    """Like `read_settings`, from the text of a file, as a store keeps it; `path` is for messages."""
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         what, _, at = str(error).rpartition(" (at ")
-        told = re.match(r"line (\d+)", at)
-        line = told[1] if told else text.count("\n") + 1  # "at end of document"
-        raise SettingsError([f"{path}:{line}: no valid TOML: {what}"]) from None
-    except (ValueError, RecursionError) as error:  # a number of too many digits, arrays too deep
-        raise SettingsError([f"{path}: no valid TOML: {error}"]) from None
+        located = re.match(r"line (\d+)", at)
+        line = located[1] if located else text.count("\n") + 1  # "at end of document"
+        raise SettingsError([f"{path}:{line}: not valid TOML: {what}"]) from None
+    except (ValueError, RecursionError) as error:  # a number with too many digits, arrays nested too deep
+        raise SettingsError([f"{path}: not valid TOML: {error}"]) from None
     return overridden(SettingsFile(path, document, key_lines(text), {}), overrides)
 
 
@@ -118,7 +120,7 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
         except SettingsError as error:
             wrong.append(f"--set {override}: {error}")
             continue
-        merged = {k: o for k, o in merged.items() if k[: len(key)] != key}  # what it replaces
+        merged = {k: o for k, o in merged.items() if k[: len(key)] != key}  # without those that it replaces
         merged[key] = override
     if wrong:
         raise SettingsError(wrong)
@@ -127,9 +129,9 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
 
 
 def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:
-    """The flight of a [flight] table in file units; paths of a track and an airframe are from `folder`.
+    """The flight of a [flight] table in file units; relative paths of a track or an airframe start at `folder`.
 
-    Raises `SettingsError`, its lines without a place.
+    Raises `SettingsError`, whose lines name the key but no file.
     """
     return _flight({"flight": without_former_names(document)}, lambda key: Place(0, ""), folder)
 
@@ -141,7 +143,7 @@ def _text(path: Path) -> str:
         raise SettingsError([f"{path}: {error.strerror or error}"]) from None
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
-        raise SettingsError([f"{path}:{line}: no text in UTF-8"]) from None
+        raise SettingsError([f"{path}:{line}: not text in UTF-8"]) from None
 
 
 def _parsed(value: str) -> object:
@@ -152,7 +154,7 @@ def _parsed(value: str) -> object:
 
 
 def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flight:
-    """The flight, checked whole. Paths of a track and of an airframe are from `folder`, where the settings are."""
+    """The flight of a document, completely checked; relative paths of a track or an airframe start at `folder`."""
     match document:
         case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS:
             table = document_table(name, law.get("gains") == CUSTOM)
@@ -163,10 +165,10 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
     if flight.target.track is not None:
         track = str(folder.absolute() / flight.target.track)
         flight = replace(flight, target=replace(flight.target, track=track))
-    beside = str(folder.absolute() / flight.aircraft)
-    if flight.aircraft and aircraft.is_folder(beside) and flight.aircraft not in aircraft.names():
-        flight = replace(flight, aircraft=beside)
-    found = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
-    if found:
-        raise settings_error(found, place)
+    beside_file = str(folder.absolute() / flight.aircraft)
+    if flight.aircraft and aircraft.is_folder(beside_file) and flight.aircraft not in aircraft.names():
+        flight = replace(flight, aircraft=beside_file)
+    mistakes = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
+    if mistakes:
+        raise settings_error(mistakes, place)
     return flight

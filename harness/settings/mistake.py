@@ -1,4 +1,4 @@
-"""A mistake in the settings, and its wording: where, what is wrong, what is allowed, did you mean."""
+"""A mistake in the settings and its message: place, key, what is wrong, what is allowed, did you mean."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -9,10 +9,10 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic_core import ErrorDetails
 
 from harness.error import SettingsError, did_you_mean
-from harness.settings.table import Setting, Table
+from harness.settings.table import Setting, TableSchema
 from harness.settings.toml_locator import Key, dotted
 
-LARGEST = 1e9  # in file units: what a number that has no bound of its own may be
+LARGEST = 1e9  # in file units: the largest size of any number
 
 _NOUNS: Mapping[object, str] = {float: "number", int: "whole number", str: "string"}
 _COUNTS = {2: "two", 3: "three"}
@@ -20,36 +20,36 @@ _BOUNDS = {Gt: ">", Ge: ">=", Lt: "<", Le: "<="}
 
 
 class Place(NamedTuple):
-    """Where something stands, as a message begins."""
+    """The place of a key: a message begins with its text."""
 
-    order: int  # in which mistakes are told
-    text: str
+    order: int  # messages are sorted by it
+    text: str  # FILE:LINE or --set KEY=VALUE; may be empty
 
 
-Places = Callable[[Key], Place]  # where each key stands
+Places = Callable[[Key], Place]  # the place of each key
 
 
 class Mistake(NamedTuple):
-    """What is wrong with the value at a key."""
+    """What is wrong at a key."""
 
     key: Key
     message: str
 
 
 def settings_error(mistakes: Sequence[Mistake], place: Places) -> SettingsError:
-    """The mistakes as one error, in the order of the file."""
+    """The mistakes as one error, in the order of their places."""
     placed = sorted(((place(key), f"{dotted(key)}: {message}") for key, message in mistakes), key=lambda p: p[0].order)
-    return SettingsError(list(dict.fromkeys(": ".join(filter(None, (at.text, told))) for at, told in placed)))
+    return SettingsError(list(dict.fromkeys(": ".join(filter(None, (at.text, text))) for at, text in placed)))
 
 
-def mistake(table: Table, document: Any, details: ErrorDetails) -> Mistake:
-    """A mistake that pydantic found, in words of the file."""
+def mistake(table: TableSchema, document: Any, details: ErrorDetails) -> Mistake:
+    """A mistake that pydantic reports, in terms of the file."""
     key: Key = ()
     value = document
     setting: Setting | None = None
     for step in details["loc"]:
         if setting and not setting.table:
-            break  # within a value, which is told whole
+            break  # inside a value: the message shows the whole value
         key = (*key, step)
         if isinstance(step, int):
             value = value[step]
@@ -68,13 +68,13 @@ def mistake(table: Table, document: Any, details: ErrorDetails) -> Mistake:
         expected = expected.replace("number", "finite number")
     if details["type"] == "too_large":
         expected += f", of {LARGEST:g} at most in size"
-    return Mistake(key, f"is {_shown(value)}, must be {expected}{did_you_mean(value, _choices(setting))}")
+    return Mistake(key, f"is {_text(value)}, must be {expected}{did_you_mean(value, _choices(setting))}")
 
 
 def _expected(setting: Setting) -> str:
     if choices := _choices(setting):
-        shown = [_shown(choice) for choice in choices]
-        return " or ".join(shown) if len(shown) < 3 else f"one of {', '.join(shown)}"
+        texts = [_text(choice) for choice in choices]
+        return " or ".join(texts) if len(texts) < 3 else f"one of {', '.join(texts)}"
     if setting.kind is bool:
         return "true or false"
     noun = _NOUNS.get(setting.kind, "table")
@@ -92,6 +92,6 @@ def _choices(setting: Setting) -> tuple[str, ...]:
     return get_args(setting.kind) if get_origin(setting.kind) is Literal else ()
 
 
-def _shown(value: object) -> str:
+def _text(value: object) -> str:
     text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 60 else f"{text[:57]}..."

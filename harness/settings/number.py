@@ -1,4 +1,4 @@
-"""A number in the unit of its file key."""
+"""Conversion of a number from SI to the unit of its key in a file."""
 
 import math
 
@@ -6,7 +6,7 @@ from autopilot.quantities import Unit
 
 
 def in_file(value: float, unit: Unit) -> float:
-    """The shortest number in the file's unit that is read back as exactly this value, if there is one."""
+    """The shortest number in `unit` that converts back to exactly this SI value; the quotient if there is none."""
     if unit.si == 1.0:
         return value
     quotient = value / unit.si

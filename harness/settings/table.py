@@ -1,4 +1,4 @@
-"""A table of a settings file, read off a dataclass: a field's annotation gives its key, unit and bounds."""
+"""The schema of a table in a settings file, read from a dataclass: annotations give key, unit, bounds, choices."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
@@ -15,30 +15,30 @@ _PLAIN = Unit("", 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
-    """A table of a file: its keys, and what is made of their values, given by field name."""
+class TableSchema:
+    """The schema of a table: its settings by key, and the function that builds a value from them by field name."""
 
     settings: Mapping[str, "Setting"]
     make: Callable[..., object]
-    open: bool = False  # to keys that it does not know
+    open: bool = False  # whether unknown keys are allowed
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A field of a dataclass, as a file has it."""
+    """The schema of one key: a field of a dataclass as a file holds it."""
 
-    kind: object  # float, str, a Literal…; of each element when there is a length
-    name: str = ""
+    kind: object  # float, str, a Literal, ...; of each element if there is a length
+    name: str = ""  # of the field
     unit: Unit = _PLAIN
     bounds: tuple[Gt | Ge | Lt | Le, ...] = ()  # in file units
-    length: int | EllipsisType | None = None  # of a list; `...` for any
-    table: Table | None = None  # it is a table, or a list of such
-    optional: bool = False  # None is a value
+    length: int | EllipsisType | None = None  # of a list; `...` stands for any length
+    table: TableSchema | None = None  # the schema, if the value is a table or a list of tables
+    optional: bool = False  # whether the field may be None
     required: bool = True
-    infinite: bool = False  # infinity is a value
+    infinite: bool = False  # whether infinity is allowed
 
 
-def _read(part: type) -> Table:
+def _read(part: type) -> TableSchema:
     hints = get_type_hints(part, include_extras=True)
     settings = {}
     for f in fields(part):
@@ -46,14 +46,16 @@ def _read(part: type) -> Table:
         setting = replace(_annotated(hints[f.name]), name=f.name, required=required)
         key = f"{f.name.rstrip('_')}_{setting.unit.suffix}".rstrip("_")
         settings[key] = setting
-    return Table(settings, part)
+    return TableSchema(settings, part)
 
 
-table_of: Callable[[type], Table] = cache(_read)  # no decorator: to mypy a class is not hashable
+schema_of: Callable[[type], TableSchema] = cache(
+    _read
+)  # not as a decorator: mypy would not accept a class as an argument
 
 
 def _annotated(hint: object) -> Setting:
-    """What an annotation says of a setting."""
+    """The schema that a field's annotation gives."""
     if get_origin(hint) is Annotated:
         inner, *marks = get_args(hint)
         setting = _annotated(inner)
@@ -74,4 +76,4 @@ def _annotated(hint: object) -> Setting:
     if get_origin(hint) is tuple:
         element, *others = get_args(hint)
         return replace(_annotated(element), length=... if others == [...] else 1 + len(others))
-    return Setting(hint, table=table_of(hint) if isinstance(hint, type) and is_dataclass(hint) else None)
+    return Setting(hint, table=schema_of(hint) if isinstance(hint, type) and is_dataclass(hint) else None)

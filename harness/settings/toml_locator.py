@@ -1,4 +1,4 @@
-"""Where each key of a TOML text stands: tomllib tells values, not lines."""
+"""The line of each key in a TOML text, which tomllib does not give."""
 
 import json
 import re
@@ -27,9 +27,9 @@ _TOKEN = re.compile(
 
 
 def key_lines(text: str) -> dict[Key, int]:
-    """The line, from 1, of each key, table and element of an array in a text that tomllib accepts.
+    """The line, from 1, of each key, table and array element of a text that tomllib accepts.
 
-    What stands inside an inline table or a nested array has no line of its own: see `nearest_line`.
+    Keys and elements inside an inline table or a nested array have no entry: see `nearest_line`.
     """
     text = text.replace("\r\n", "\n")
     ends = [newline.start() for newline in re.finditer("\n", text)]
@@ -61,7 +61,7 @@ def key_lines(text: str) -> dict[Key, int]:
 
 
 def nearest_line(lines: Mapping[Key, int], key: Key) -> int:
-    """The line of the key, or of the nearest table around it that has one; 1 at the outermost."""
+    """The line of the key, or of the innermost table around it that has a line; 1 if none has."""
     for length in range(len(key), 0, -1):
         if key[:length] in lines:
             return lines[key[:length]]
@@ -69,12 +69,12 @@ def nearest_line(lines: Mapping[Key, int], key: Key) -> int:
 
 
 def dotted(key: Key) -> str:
-    """The key in one word, as a message names it; parts that TOML would quote are quoted."""
+    """The key as messages show it, with dots; parts that TOML would quote are quoted."""
     return ".".join(str(k) if re.fullmatch(r"[\w-]+", str(k), re.ASCII) else json.dumps(k) for k in key)
 
 
 def _names(key: str) -> list[str]:
-    """The parts of a dotted key, read by the one who knows how quotes and escapes are read."""
+    """The parts of a dotted key; tomllib reads its quotes and escapes."""
     names = []
     value = tomllib.loads(f"{key} = 0")
     while isinstance(value, dict):
@@ -84,10 +84,10 @@ def _names(key: str) -> list[str]:
 
 
 def _value(text: str, position: int) -> tuple[list[int], int]:
-    """Where the elements start if the value that starts here is an array, and where the value ends."""
+    """For the value that starts at `position`: the starts of its elements if it is an array, and its end."""
     starts: list[int] = []
-    opened = ""  # the brackets around the token
-    awaited = False  # the next token begins an element of the outermost array
+    opened = ""  # the open brackets around the token
+    awaited = False  # whether the next token begins an element of the outermost array
     while token := _TOKEN.match(text, position):
         mark = token[0]
         if not opened and mark in ("\n", "]", "}"):

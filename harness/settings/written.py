@@ -1,4 +1,4 @@
-"""A flight written as a file has it."""
+"""A flight as the [flight] table of a settings file."""
 
 import math
 from typing import Any
@@ -6,18 +6,18 @@ from typing import Any
 from autopilot.laws import LAWS
 from harness.flight import Flight
 from harness.settings.number import in_file
-from harness.settings.table import Setting, table_of
+from harness.settings.table import Setting, schema_of
 
 
 def document(flight: Flight) -> dict[str, Any]:
-    """The flight as a [flight] table in file units: every key, fit for JSON. `flight_from_document` undoes it."""
+    """The flight as a [flight] table in file units, all keys, fit for JSON. `flight_from_document` is the inverse."""
     name = next(name for name, kind in LAWS.items() if kind.value is type(flight.law))
     return {**written(flight), "law": {"name": name, **written(flight.law)}}
 
 
 def written(part: object) -> dict[str, Any]:
-    """A dataclass as a table in file units."""
-    return {key: _written_value(getattr(part, s.name), s) for key, s in table_of(type(part)).settings.items()}
+    """The fields of a dataclass as a table in file units, fit for JSON."""
+    return {key: _written_value(getattr(part, s.name), s) for key, s in schema_of(type(part)).settings.items()}
 
 
 def _written_value(value: object, setting: Setting) -> object:

@@ -67,7 +67,7 @@ def load_track(path: Path) -> Track:
     except OSError as error:
         raise TrackError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise TrackError(f"{path}: no text in UTF-8") from None
+        raise TrackError(f"{path}: not text in UTF-8") from None
     except ValueError as error:  # not a path, e.g. with a null character
         raise TrackError(f"{str(path)!r}: {error}") from None
 
