@@ -156,14 +156,10 @@ def about(kind: type, name: str) -> str:
 
 def _metrics() -> Iterator[str]:
     rows = (
-        [f"`{name}`", metric.heading, metric.label, _ideal(metric.ideal), metric.meaning]
+        [f"`{name}`", metric.heading, metric.label, f"{metric.ideal:g}" if metric.compared else "–", metric.meaning]
         for name, metric in METRICS.items()
     )
     return markdown(["name", "heading in tables", "unit", "ideal", "meaning"], rows)
-
-
-def _ideal(value: float | None) -> str:
-    return "–" if value is None else f"{value:g}"
 
 
 def _margins() -> Iterator[str]:
