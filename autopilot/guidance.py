@@ -8,7 +8,9 @@ class Observation(NamedTuple):
     """All that a law may know. SI, rad, world frame north-east from the flight's origin; headings clockwise from north.
 
     `heading` is psi_a, the direction of (ground velocity - estimated steady wind), and `heading_rate` its rate; not the
-    nose. The target is as estimated; its acceleration and turn rate are zero when unknown.
+    nose. Velocities are over the ground; `airspeed` is measured, `nominal_airspeed` is commanded; `wind_north` and
+    `wind_east` are the estimated steady wind: where the air moves to. The target is as estimated; its acceleration (of
+    its speed) and turn rate are zero when unknown.
     """
 
     north: float
@@ -32,7 +34,11 @@ class Observation(NamedTuple):
 
 
 class Guidance(NamedTuple):
-    """A law's answer. The command is limited; the rest is telemetry. SI, rad."""
+    """A law's answer: `heading_rate` is the command, rad/s, clockwise and limited; the rest is telemetry. SI, rad.
+
+    `range_error` is r = L - R_d, `sliding_variable` s, `heading_error` psi_a against its desired value, `feed_forward`
+    the part of the command that neither s nor the manifold makes. A law that has no such thing gives NaN or zero.
+    """
 
     heading_rate: float  # the command omega_psi
     range_error: float  # r = L - R_d

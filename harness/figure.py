@@ -62,19 +62,24 @@ def draw_track(axes: Axes, logs: Sequence[FlightLog], names: Sequence[str]) -> N
         axes.plot(log["east"], log["north"], color=colour, lw=1.2, label=name)
         axes.plot(log["east"][:1], log["north"][:1], "o", color=colour, ms=5)
     axes.plot([], [], "o", color="tab:gray", ms=5, label="start")
-    longest = max(logs, key=len)
-    east, north = longest["target_east"], longest["target_north"]
-    if np.ptp(east) or np.ptp(north):
-        axes.plot(east, north, color="black", lw=0.8, ls=":", label="target's track")
-    axes.plot(east[-1:], north[-1:], "x", color="black", ms=7, label="target")
     around = np.linspace(0.0, 2.0 * np.pi, 361)
-    for standoff in sorted({log.flight.law.standoff for log in logs}):
+    circled = {
+        (log.flight.target, log.flight.law.standoff): log for log in sorted(logs, key=len)
+    }  # the longest of each
+    for (_, standoff), log in circled.items():
+        east, north = log["target_east"], log["target_north"]
+        if np.ptp(east) or np.ptp(north):
+            axes.plot(east, north, color="black", lw=0.8, ls=":", label="target's track")
+        axes.plot(east[-1:], north[-1:], "x", color="black", ms=7, label="target")
         circle = east[-1] + standoff * np.sin(around), north[-1] + standoff * np.cos(around)
         axes.plot(*circle, color="black", lw=0.8, ls="--", label=f"standoff circle, {standoff:g} m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("east, m")
     axes.set_ylabel("north, m")
-    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, frameon=False)
+    handles = {handle.get_label(): handle for handle in axes.get_legend_handles_labels()[0]}  # each label once
+    axes.legend(
+        handles=handles.values(), fontsize=8, ncols=3, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.12)
+    )
 
 
 def draw_range_error(axes: Axes, logs: Sequence[FlightLog]) -> None:

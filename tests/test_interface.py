@@ -21,7 +21,7 @@ from harness.key import flight_key
 from harness.log import COLUMNS
 from harness.loop import simulate
 from harness.metric import measure
-from tests.builders import EXPERIMENTS, FLIGHT, ROOT, SIXDOF, command, python, result_matrix, shifted, write
+from tests.builders import DOCS, EXPERIMENTS, FLIGHT, ROOT, SIXDOF, command, python, result_matrix, shifted, write
 
 MATRIX = """\
 [flight]
@@ -63,6 +63,12 @@ def test_every_public_name_is_found_listed_and_documented(name: str) -> None:
     assert name in dir(harness)
     assert value.__name__ == name
     assert inspect.getdoc(value)
+
+
+def test_the_reference_page_documents_every_public_name() -> None:
+    page = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    documented = re.findall(r"\.\. auto(?:class|function|exception):: (\w+)", page)
+    assert sorted(documented) == sorted(harness.__all__)
 
 
 def test_no_module_bears_the_name_of_a_public_name() -> None:
