@@ -30,7 +30,7 @@ def imported() -> set[str]:
     return {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
 
 
-def main(starts: int) -> None:
+def main(starts: int = 15) -> None:
     """Print median and range of both, and which heavy packages were imported."""
     for what, command in (("harness --help", [HARNESS, "--help"]), ("bare Python", [sys.executable, "-c", ""])):
         times = [1e3 * seconds(list(map(str, command))) for _ in range(starts)]
@@ -40,4 +40,4 @@ def main(starts: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 15)
+    main(*map(int, sys.argv[1:2]))

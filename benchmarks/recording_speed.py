@@ -1,7 +1,7 @@
-"""The cost of recordings: `python -m benchmarks.recording_speed [TIMES]`.
+"""The cost of recordings: `python -m benchmarks.recording_speed [TIMES [SECONDS]]`.
 
-Writing a 900 s, 20 Hz flight with its estimator, in gusts, everything logged and drawn: seconds, megabytes, channels;
-and from the start of the viewer's process until it has drawn a pair of such flights.
+Writing a flight of 900 s, or as long as asked, at 20 Hz, with its estimator, in gusts, everything logged and drawn:
+seconds, megabytes, channels; and from the start of the viewer's process until it has drawn a pair of such flights.
 """
 
 import sys
@@ -19,13 +19,13 @@ from harness.review.viewer import headless
 from harness.settings import flight_from_document
 
 
-def flown(plant: str) -> FlightLog:
+def flown(plant: str, duration: float) -> FlightLog:
     """A flight that fills every column."""
     return simulate(
         flight_from_document(
             {
                 "plant": plant,
-                "duration_s": 900.0,
+                "duration_s": duration,
                 "law": {"name": "nftsm", "gains": "paper_1", "max_heading_rate_deg_s": 10.0},
                 "wind": {"steady_mps": [2.0, 0.0], "turbulence": "light"},
                 "target": {"speed_mps": 1.0},
@@ -62,15 +62,15 @@ def opened(path: Path, shot: Path) -> float:
         return time.perf_counter() - begin
 
 
-def main(times: int) -> None:
+def main(times: int = 5, duration: float = 900.0) -> None:
     """Print seconds and sizes."""
-    kinematic, sixdof = flown("kinematic"), flown("sixdof")
+    kinematic, sixdof = (flown(plant, duration) for plant in ("kinematic", "sixdof"))
     with tempfile.TemporaryDirectory() as folder:
         one, pair = Path(folder) / "one.rrd", Path(folder) / "pair.rrd"
         written(one, {"sixdof": sixdof})
         seconds = [written(one, {"sixdof": sixdof}) for _ in range(times)]
         size = one.stat().st_size / 1e6
-        print(f"900 s at 20 Hz, {len(COLUMNS)} columns, {channels(one)} channels with those drawn: ", end="")
+        print(f"{duration:g} s at 20 Hz, {len(COLUMNS)} columns, {channels(one)} channels with those drawn: ", end="")
         print(f"written in {spread(seconds)} s, {size:.1f} MB")
         written(pair, {"kinematic": kinematic, "sixdof": sixdof})
         shows = [opened(pair, Path(folder) / "shot.png") for _ in range(times)]
@@ -78,4 +78,4 @@ def main(times: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+    main(*map(int, sys.argv[1:3]))

@@ -1,7 +1,7 @@
-"""The cost of running many flights: `python -m benchmarks.runs [PAIRS]`.
+"""The cost of running many flights: `python -m benchmarks.runs [PAIRS [ROWS [SECONDS]]]`.
 
 One worker against two, kinematic and 6-DOF, in turn; what a flight costs beside its simulation; and a directory with
-100 000 finished flights: how long until the next one flies, and the memory of the parent.
+ROWS finished flights, 100 000 if not said otherwise: how long until the next one flies, and the memory of the parent.
 """
 
 import resource
@@ -24,7 +24,6 @@ from harness.runs.survey import survey
 from harness.runs.workers import Task, WorkerResult, fly_task
 from harness.settings import read_settings
 
-ROWS = 100_000
 SETTINGS = """\
 [flight]
 plant = "{plant}"
@@ -122,29 +121,29 @@ def shown(values: list[float]) -> str:
     return f"{statistics.median(values):.2f} ({min(values):.2f} to {max(values):.2f})"
 
 
-def main(pairs: int) -> None:
+def main(pairs: int = 5, rows: int = 100_000, duration: float = 100.0) -> None:
     """Print the numbers."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        for plant, duration, count in (("kinematic", 100.0, 300), ("sixdof", 100.0, 40)):
+        for plant, count in (("kinematic", 300), ("sixdof", 40)):
             of, ratios = matrix(folder, plant, duration, count), []
             for i in range(pairs):
                 one, two = (rate(of, folder / f"{plant}-{i}-{workers}", workers) for workers in (1, 2))
                 ratios.append(two / one)
             print(f"{plant}: two workers / one worker {shown(ratios)}")
-        few, many = (matrix(folder, "kinematic", 100.0, count) for count in (20, 420))
+        few, many = (matrix(folder, "kinematic", duration, count) for count in (20, 420))
         costs = [1e3 * overhead(few, many, folder / f"overhead-{i}") for i in range(pairs + 1)]
-        print(f"a kinematic flight of 100 s beside its simulation: {shown(costs[1:])} ms")
-        of = matrix(folder, "kinematic", 1.0, ROWS + 5)
-        fill(of, folder / "full", ROWS)
+        print(f"a kinematic flight of {duration:g} s beside its simulation: {shown(costs[1:])} ms")
+        of = matrix(folder, "kinematic", 1.0, rows + 5)
+        fill(of, folder / "full", rows)
         words = [sys.executable, "-m", "benchmarks.runs", "resume", str(of.file.path), str(folder / "full")]
         done = subprocess.run(words, capture_output=True, text=True, check=True)
         seconds, memory = map(float, done.stdout.split())
-        print(f"{ROWS} rows: {seconds:.2f} s to the next flight, {memory:.0f} MB in the parent with the export")
+        print(f"{rows} rows: {seconds:.2f} s to the next flight, {memory:.0f} MB in the parent with the export")
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["resume"]:
         resume(Path(sys.argv[2]), Path(sys.argv[3]))
     else:
-        main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+        main(*map(int, sys.argv[1:4]))

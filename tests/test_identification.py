@@ -1,16 +1,13 @@
 """What `harness identify` measures and fits: on responses that are known, and on the airframes."""
 
 import math
-import shutil
 from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import aircraft
-from harness.cli.identify import identify
 from harness.identification.fit import (
     Fitted,
     airspeed_change,
@@ -35,6 +32,7 @@ from harness.plants.plant import Start
 from harness.plants.response import Response, plain
 from harness.plants.state import State
 from harness.world.air import Air
+from tests.builders import copied_airframe, invoke
 
 KNOWN = Response(
     delay=0.033, frequency=9.0, damping=0.7, lead=-0.02, sideslip_frequency=3.0, sideslip_damping=0.4,
@@ -127,7 +125,7 @@ def test_the_airspeed_hold_follows_the_flown_airspeed_of_a_turn_entry() -> None:
 
 
 def test_an_identification_is_read_as_it_was_written(tmp_path: Path) -> None:
-    airframe = Path(shutil.copytree(aircraft.folder("aerosonde"), tmp_path / "aerosonde"))
+    airframe = copied_airframe("aerosonde", tmp_path / "aerosonde")
     one = identified(airframe, 25.0)
     other = replace(one, airspeed=20.0, heading_rate=response_of(np.array(astuple(KNOWN))))
     aircraft.identified(airframe).write_text(document(airframe, [one, other]), encoding="utf-8")
@@ -136,9 +134,9 @@ def test_an_identification_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 def test_the_command_identifies_draws_and_keeps(tmp_path: Path) -> None:
     """The whole of `harness identify`, on a folder of the user's own: as `make identify` left the airframe itself."""
-    airframe = Path(shutil.copytree(aircraft.folder("skywalker_x8"), tmp_path / "skywalker_x8"))
+    airframe = copied_airframe("skywalker_x8", tmp_path / "skywalker_x8")
     aircraft.identified(airframe).write_text("damaged", encoding="utf-8")
-    result = CliRunner().invoke(identify, [str(airframe), "--out", str(tmp_path / "plots")])
+    result = invoke("identify", airframe, "--out", tmp_path / "plots")
     assert result.exit_code == 0, result.output
     for told in ("63 %", "bandwidth", "turn ratio", "delay", "damping", "lagged  coordinated"):
         assert told in result.output
@@ -165,7 +163,7 @@ def test_the_command_identifies_draws_and_keeps(tmp_path: Path) -> None:
 )
 def test_bad_input_is_one_line_and_leaves_nothing(arguments: list[str], said: str, tmp_path: Path) -> None:
     before = aircraft.identified(aircraft.folder("aerosonde")).read_bytes()
-    result = CliRunner().invoke(identify, ["--out", str(tmp_path / "out"), *arguments])
+    result = invoke("identify", "--out", tmp_path / "out", *arguments)
     assert result.exit_code == 2
     assert said in result.output
     assert aircraft.identified(aircraft.folder("aerosonde")).read_bytes() == before

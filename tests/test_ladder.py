@@ -1,7 +1,6 @@
 """The plants between the kinematic and the 6-DOF one: closed forms, and each the one below it in the limit."""
 
 import math
-import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from harness.plants.lagged import Lagged
 from harness.plants.plant import Flying, Plant, Start
 from harness.plants.response import Response, plain
 from harness.world.air import Air
+from tests.builders import copied_airframe
 
 START = Start(position=(5.0, -7.0), heading=0.3, airspeed=13.0)
 STILL = Air()
@@ -166,7 +166,7 @@ def test_each_rung_has_the_metrics_of_what_it_has() -> None:
 
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
-    return Path(shutil.copytree(aircraft.folder("ultra_stick_25e"), tmp_path / "ultra_stick_25e"))
+    return copied_airframe("ultra_stick_25e", tmp_path / "ultra_stick_25e")
 
 
 def test_what_was_identified_counts_in_the_key(copied: Path) -> None:

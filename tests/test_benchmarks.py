@@ -1,0 +1,52 @@
+"""The benchmarks run: each on the least that it measures, with its numbers printed."""
+
+import re
+
+import pytest
+
+from benchmarks import flight_speed, help_speed, recording_speed, runs
+from tests.builders import drawing
+
+
+def lines(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    return capsys.readouterr().out.splitlines()
+
+
+def medians(line: str) -> list[float]:
+    """The medians of a line, each printed before its range."""
+    return [float(found) for found in re.findall(r"([\d.]+)(?: ms)? \([\d.]+ to ", line)]
+
+
+def test_a_flight_costs_at_least_its_bare_loop(capsys: pytest.CaptureFixture[str]) -> None:
+    flight_speed.main(pairs=1, duration=20)
+    _, *airframes, kinematic = lines(capsys)
+    for flight in airframes[::2]:
+        ratio, seconds = medians(flight)
+        assert ratio > 0.8  # that of a loop which does nothing else, but for the clock
+        assert seconds > 0.0
+    assert all(medians(line) for line in airframes[1::2])
+    assert medians(kinematic)
+
+
+def test_the_help_imports_nothing_heavy(capsys: pytest.CaptureFixture[str]) -> None:
+    help_speed.main(starts=1)
+    help_, bare, imports = lines(capsys)
+    assert medians(help_) > medians(bare)
+    assert imports.endswith("it imports none")
+
+
+def test_many_flights_are_timed_with_one_worker_and_two(capsys: pytest.CaptureFixture[str]) -> None:
+    runs.main(pairs=1, rows=50, duration=10)
+    kinematic, sixdof, cost, resumed = lines(capsys)
+    assert medians(kinematic)[0] > 0.0
+    assert medians(sixdof)[0] > 0.0
+    assert medians(cost)
+    assert resumed.startswith("50 rows: ")
+
+
+@drawing
+def test_recordings_are_timed_until_they_are_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    recording_speed.main(times=1, duration=5)
+    written, drawn = lines(capsys)
+    assert medians(written)[0] > 0.0
+    assert medians(drawn)[0] > 0.0
