@@ -30,6 +30,9 @@ BLOCK = re.compile(
 )
 
 
+IN_ONE_PROCESS = 'harness() { [ "$1" != run ] || set -- "$@" --workers 0; command harness "$@"; }\n'  # no pool to start
+
+
 class Block(NamedTuple):
     """A fenced block."""
 
@@ -122,7 +125,7 @@ def run(script: str, folder: Path) -> str:
         "CI": "1",
     }
     ran = subprocess.run(
-        ["bash", "-euc", script],
+        ["bash", "-euc", IN_ONE_PROCESS + script],
         cwd=folder,
         env=environment,
         stdin=subprocess.DEVNULL,
