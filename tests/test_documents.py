@@ -162,6 +162,14 @@ def test_every_column_of_a_log_is_explained() -> None:
     assert set(COLUMNS) <= explained
 
 
+def test_the_layers_in_the_text_are_those_that_the_linter_holds() -> None:
+    rows = re.findall(r"^\| (\d+) \| ([^|]*) \|", (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8"), re.M)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (layers,) = (c["layers"] for c in project["tool"]["importlinter"]["contracts"] if c["type"] == "layers")
+    assert [int(floor) for floor, _ in rows] == list(range(len(layers), 0, -1))
+    assert [re.findall(r"`(\w+)`", rooms) for _, rooms in rows] == [re.findall(r"\w+", layer) for layer in layers]
+
+
 def test_readme_fits_two_screens() -> None:
     lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
     assert len(lines) <= 90
