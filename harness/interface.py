@@ -39,8 +39,7 @@ def simulate(flight: Flight, watch: "Watch | None" = None) -> FlightLog:
     >>> log = harness.simulate(flight)
     >>> log.outcome, log.metrics["convergence_time_s"]
     """
-    _check(flight)
-    return loop.simulate(flight, watch)
+    return loop.simulate(_checked(flight), watch)
 
 
 def metrics(log: FlightLog) -> dict[str, float | bool | None]:
@@ -55,12 +54,13 @@ def metrics(log: FlightLog) -> dict[str, float | bool | None]:
 
 
 def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title: str = "", notes: str = "") -> Path:
-    """Writes one flight, or several by name, into a Rerun recording (`.rrd`) and returns its path.
+    """Writes one flight, or several by name, into a Rerun recording (`.rrd`) and returns its path, whole or not at all.
 
     Of several the first is the reference, drawn wide and pale under the others. `notes` is Markdown, shown above the
     results. `harness view PATH` shows it, `read_flight(PATH)` reads it back.
 
-    Raises OSError when it cannot be written, ValueError for more flights than can be told apart.
+    Raises OSError when it cannot be written, ValueError for more flights than can be told apart, `SettingsError` for a
+    law that has no name.
 
     >>> harness.record(log, "flight.rrd")
     >>> harness.record({"kinematic": kinematic, "sixdof": sixdof}, "pair.rrd", title="The same flight twice")
@@ -162,8 +162,11 @@ def _line(state: "Progress") -> str:
     return f"{done} of {state.total} flights done, {state.failed} failed, {state.seconds:.0f} s"
 
 
-def _check(flight: Flight) -> None:
-    """Every field by its declaration, as a file's values are checked. Raises `SettingsError`."""
+def _checked(flight: Flight) -> Flight:
+    """The flight, every field checked by its declaration as a file's values are; paths become text.
+
+    Raises `SettingsError`.
+    """
     if not isinstance(flight, Flight):
         raise SettingsError([f"flight: is {flight!r}, must be a harness.Flight"])
     if not callable(getattr(flight.law, "start", None)):
@@ -172,5 +175,10 @@ def _check(flight: Flight) -> None:
         value, kind = getattr(flight, part.name), part.default_factory
         if isinstance(kind, type) and is_dataclass(kind) and not isinstance(value, kind):
             raise SettingsError([f"flight.{part.name}: is {value!r}, must be a harness.{kind.__name__}"])
-    is_own = type(flight.law) not in [kind.value for kind in LAWS.values()]
+    target = flight.target
+    if target.track is not None:
+        target = replace(target, track=str(target.track))
+    flight = replace(flight, aircraft=str(flight.aircraft), target=target)
+    is_own = type(flight.law) not in [kind.value for kind in LAWS.values()]  # a law of one's own checks itself
     flight_from_document(document(replace(flight, law=law("nftsm")) if is_own else flight))
+    return flight

@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+import aircraft
 import harness
 from harness.key import flight_key
 from harness.log import COLUMNS
@@ -187,18 +188,33 @@ def test_all_mistakes_of_a_flight_are_told_at_once() -> None:
     assert len(raised.value.lines) == 3
 
 
-def test_a_law_of_ones_own_can_be_flown() -> None:
-    class Straight:
-        standoff, max_heading_rate, command = 200.0, 0.1, "heading_rate"
+class Straight:
+    """A law of one's own, without a name in `LAWS`."""
 
-        def start(self) -> Callable[[harness.Observation], harness.Guidance]:
-            return lambda o: harness.Guidance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    standoff, max_heading_rate, command = 200.0, 0.1, "heading_rate"
 
-        def broken_conditions(self, speed_ratio: float) -> list[str]:
-            return []
+    def start(self) -> Callable[[harness.Observation], harness.Guidance]:
+        return lambda observation: harness.Guidance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        return []
+
+
+def test_a_law_of_ones_own_is_flown_but_not_recorded_without_a_name(tmp_path: Path) -> None:
     log = harness.simulate(replace(FLIGHT, law=Straight()))  # type: ignore[arg-type]
     assert np.ptp(log["heading"]) == 0.0
+    with pytest.raises(harness.SettingsError, match=r"flight\.law: Straight has no name in autopilot/laws\.py"):
+        harness.record(log, tmp_path / "a.rrd")
+
+
+def test_an_airframe_and_a_track_may_be_paths(tmp_path: Path) -> None:
+    track = write(tmp_path / "track.csv", "time_s,north_m,east_m\n0,0,0\n10,5,0\n20,10,0\n30,15,0\n")
+    folder = aircraft.folder("aerosonde")
+    by_text = replace(FLIGHT, aircraft=str(folder), target=harness.Target(track=str(track)))
+    by_path = replace(FLIGHT, aircraft=folder, target=harness.Target(track=track))  # type: ignore[arg-type]
+    log = harness.simulate(by_path)
+    assert log.flight == by_text
+    assert log.digest == harness.simulate(by_text).digest
 
 
 @pytest.mark.parametrize(

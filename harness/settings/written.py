@@ -4,14 +4,21 @@ import math
 from typing import Any
 
 from autopilot.laws import LAWS
+from harness.error import SettingsError
 from harness.flight import Flight
 from harness.settings.number import in_file
 from harness.settings.table import Setting, schema_of
 
 
 def document(flight: Flight) -> dict[str, Any]:
-    """The flight as a [flight] table in file units, all keys, fit for JSON. `flight_from_document` is the inverse."""
-    name = next(name for name, kind in LAWS.items() if kind.value is type(flight.law))
+    """The flight as a [flight] table in file units, all keys, fit for JSON. `flight_from_document` is the inverse.
+
+    Raises `SettingsError` for a law without a name.
+    """
+    name = next((name for name, kind in LAWS.items() if kind.value is type(flight.law)), None)
+    if name is None:
+        own = type(flight.law).__name__
+        raise SettingsError([f"flight.law: {own} has no name in autopilot/laws.py, by which a file could keep it"])
     return {**written(flight), "law": {"name": name, **written(flight.law)}}
 
 
