@@ -7,15 +7,17 @@ Z_k+1), and arctan(y/x) is atan2(y, x).
 """
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, NamedTuple
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
 from autopilot.angles import wrap
-from autopilot.quantities import About, Metres, MetresPerSecond, Seconds, Unit
+from autopilot.quantities import About, Metres, MetresPerSecond, OneOf, Seconds, Unit
 
 Array = NDArray[np.float64]
 
@@ -46,12 +48,40 @@ class Estimate(NamedTuple):
     target_velocity_east_variance: float
 
 
+class TargetFilter(Protocol):
+    """A filter in flight: `update` at every measurement, `at` in between."""
+
+    def update(self, measured: Measurement) -> Measurement:
+        """Takes in the next measurement and returns its innovation: NaN when the filter started from it."""
+        ...
+
+    def at(self, age: float) -> Estimate:
+        """The estimate `age` s after the latest measurement."""
+        ...
+
+
+class EstimatorKind(NamedTuple):
+    """A way to know the target."""
+
+    about: str
+    start: "Callable[[Estimator], TargetFilter] | None" = None  # before its first measurement; None: no filter
+    libraries: tuple[str, ...] = ()  # distributions that decide its estimates
+
+
+ESTIMATORS: Mapping[str, EstimatorKind] = MappingProxyType(
+    {
+        "truth": EstimatorKind("the target's own state"),
+        "ekf": EstimatorKind("as tracked by range and azimuth", lambda settings: ekf(settings), ("filterpy",)),
+    }
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimator:
     """What the law knows of the target. Defaults are the paper's; its diag(0.5, 0.015) is in m^2 and rad^2."""
 
     kind: Annotated[
-        Literal["truth", "ekf"], About("truth: the target's own state; ekf: as tracked by range and azimuth")
+        str, OneOf(tuple(ESTIMATORS)), About("; ".join(f"{name}: {kind.about}" for name, kind in ESTIMATORS.items()))
     ] = "truth"
     acceleration: Annotated[
         Literal["known", "unknown"], About("the target's, to a law that is told the truth; an ekf knows of none")
@@ -76,20 +106,33 @@ class Estimator:
         SquareMetresPerSecond, Ge(0), About("per axis; by default (2 m/s)^2, the speed of the paper's target")
     ] = 4.0
 
-    def start(self) -> "Tracker":
-        """The filter before its first measurement."""
-        from filterpy.kalman import ExtendedKalmanFilter  # takes half a second: who knows the truth does without
+    @property
+    def filters(self) -> bool:
+        """Whether the law knows the target through a sensor and a filter; False: it knows the truth."""
+        return ESTIMATORS[self.kind].start is not None
 
-        T_s, q, q_dot = self.period, self.process_position_variance, self.process_velocity_variance
-        kalman = ExtendedKalmanFilter(dim_x=4, dim_z=2)
-        kalman.F = np.kron(np.eye(2), [[1.0, T_s], [0.0, 1.0]])
-        kalman.Q = np.diag([q, q_dot, q, q_dot])
-        kalman.R = np.diag([self.range_variance, self.azimuth_variance])
-        return Tracker(self, kalman)
+    def start(self) -> TargetFilter:
+        """The filter before its first measurement. ValueError for a kind without a filter."""
+        start = ESTIMATORS[self.kind].start
+        if start is None:
+            raise ValueError(f"the estimator {self.kind!r} has no filter")
+        return start(self)
+
+
+def ekf(settings: Estimator) -> "Tracker":
+    """The paper's extended Kalman filter before its first measurement."""
+    from filterpy.kalman import ExtendedKalmanFilter  # takes half a second: who knows the truth does without
+
+    T_s, q, q_dot = settings.period, settings.process_position_variance, settings.process_velocity_variance
+    kalman = ExtendedKalmanFilter(dim_x=4, dim_z=2)
+    kalman.F = np.kron(np.eye(2), [[1.0, T_s], [0.0, 1.0]])
+    kalman.Q = np.diag([q, q_dot, q, q_dot])
+    kalman.R = np.diag([settings.range_variance, settings.azimuth_variance])
+    return Tracker(settings, kalman)
 
 
 class Tracker:
-    """The filter in flight: `update` at every measurement, `at` in between."""
+    """The extended Kalman filter in flight."""
 
     def __init__(self, settings: Estimator, kalman: Any) -> None:
         self.kalman = kalman  # filterpy's, which has no types: x, P, y and mahalanobis are those of the latest update

@@ -47,7 +47,7 @@ def problems(flight: Flight) -> list[Problem]:
             many = f"takes {flight.duration / period:.3g} {what} of {period:g} s, must be {most:g} at most"
             mistakes.append(Problem("duration", many))
     sample, guidance = flight.estimator.period, flight.guidance_period
-    if flight.estimator.kind == "ekf":
+    if flight.estimator.filters:
         if not _is_multiple(sample, flight.step):
             not_multiple = f"{sample:g} s is not a whole multiple of step_s, {flight.step:g} s"
             mistakes.append(Problem("estimator.period", not_multiple))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import aircraft
 import autopilot
+from autopilot.estimator import ESTIMATORS
 from harness.flight import Flight
 from harness.plants.ladder import PLANTS
 from harness.settings import document
@@ -47,7 +48,7 @@ def version_of(flight: Flight) -> Version:
     libraries = {
         "plant": PLANTS[flight.plant].libraries,
         "turbulence": ("numpy", "scipy") if flight.wind.turbulence != "none" else (),
-        "filterpy": ("filterpy",) if flight.estimator.kind == "ekf" else (),
+        "estimator": ESTIMATORS[flight.estimator.kind].libraries,
     }
     paths = _paths(flight.plant, flight.aircraft, flight.target.track)
     changed = tuple((name, path, path.stat().st_mtime_ns) for name, path in paths)

@@ -34,7 +34,7 @@ def simulate(flight: Flight, watch: Watch | None = None, *, plant: Plant | None 
     monitoring_range = flight.metrics.monitoring_range
 
     target = flight.target.start()
-    estimation = Estimation(flight, target) if flight.estimator.kind == "ekf" else None
+    estimation = Estimation(flight, target) if flight.estimator.filters else None
     estimator = estimation.at if estimation else perfect_estimator(flight.estimator)
     law = flight.law.start()
     flying = (plant or plant_of(flight)).start(flight.start, air_of(flight))

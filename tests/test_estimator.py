@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from autopilot.estimator import Estimator, Measurement, Tracker, initial, linearised, measurement, residual
+from autopilot.estimator import Estimator, Measurement, Tracker, ekf, initial, linearised, measurement, residual
 from autopilot.guidance import Guidance, Observation
 from autopilot.laws import law
 from harness.checks import problems
@@ -51,7 +51,7 @@ def test_the_linearisation_is_the_derivative_of_the_measurement(x: float, y: flo
 
 def test_a_target_at_the_sensor_leaves_the_filter_finite() -> None:
     assert not linearised(column(3.0, 0.0, -4.0, 0.0), 3.0, -4.0).any()
-    tracker = replace(PAPER, initial_position=(0.0, 0.0)).start()
+    tracker = ekf(replace(PAPER, initial_position=(0.0, 0.0)))
     tracker.update(Measurement(0.3, 1.0))
     assert all(map(math.isfinite, tracker.at(0.5)))
 
@@ -70,7 +70,7 @@ def test_the_azimuth_residual_is_the_short_way_round(expected: float, difference
 def test_exact_measurements_of_a_constant_velocity_bring_the_truth(
     start: tuple[float, float], velocity: tuple[float, float]
 ) -> None:
-    tracker = PAPER.start()
+    tracker = ekf(PAPER)
     for k in range(600):
         x, y = (p + v * 0.5 * k for p, v in zip(start, velocity, strict=True))
         tracker.update(measurement(x, y, 0.0, 0.0))
@@ -89,7 +89,7 @@ def test_the_start_from_a_measurement_has_its_noise_along_and_across() -> None:
 
 
 def started(settings: Estimator, updates: int) -> Tracker:
-    tracker, draw = settings.start(), stream(7, "test")
+    tracker, draw = ekf(settings), stream(7, "test")
     for k in range(updates):
         tracker.update(Measurement(200.0 + k + draw.standard_normal(), 0.3 + 0.1 * draw.standard_normal()))
     return tracker
@@ -113,7 +113,7 @@ def test_between_measurements_the_estimate_moves_at_constant_velocity() -> None:
 
 
 def test_the_matrices_are_the_papers() -> None:
-    kalman = PAPER.start().kalman
+    kalman = ekf(PAPER).kalman
     assert kalman.F.tolist() == [[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]]
     assert kalman.Q.tolist() == np.diag([0.2, 0.01, 0.2, 0.01]).tolist()
     assert kalman.R.tolist() == np.diag([0.5, 0.015]).tolist()
@@ -256,7 +256,7 @@ def test_innovations_stand_in_the_rows_of_their_measurements() -> None:
 def test_of_several_measurements_in_a_guidance_period_all_count() -> None:
     often = replace(PAPER, period=0.1)
     log = simulate(replace(EKF, estimator=often, guidance_period=0.5))
-    tracker, measure, at = often.start(), sensor(often, 0), MOVING.start()
+    tracker, measure, at = ekf(often), sensor(often, 0), MOVING.start()
     for j in range(200 + 1):
         last = tracker.update(measure(at(j * 0.1)))
     assert log.table[-1, COLUMNS.index("target_north_seen") :].tolist() == [*tracker.at(0.0), *last]

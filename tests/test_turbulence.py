@@ -21,8 +21,8 @@ from harness.plants.plant import End, Outcome, Start
 from harness.plants.sixdof import SixDof, engage, load, trim, write
 from harness.world.air import Air, Array
 from harness.world.randomness import stream
-from harness.world.turbulence import FOOT, W20, Dryden, _gradient, dryden, lag_chain, turbulence
-from harness.world.wind import Wind
+from harness.world.turbulence import FOOT, Dryden, _gradient, dryden, lag_chain, turbulence
+from harness.world.wind import SEVERITIES, Wind
 from tests.builders import DOCS
 
 MODERATE = dryden("moderate", 13.0, 150.0)
@@ -251,7 +251,7 @@ def test_jsbsims_own_dryden_filters_have_the_same_spectra() -> None:
         engage(fdm, trim(fdm, start, Air(steady=(2.0, 0.0))), start, rate_trim=True)
         write(fdm, "simulation/randomseed", seed)
         write(fdm, "atmosphere/turb-type", 4)
-        write(fdm, "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps", W20["moderate"] / FOOT)
+        write(fdm, "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps", SEVERITIES["moderate"] / FOOT)
         write(fdm, "atmosphere/turbulence/milspec/severity", 4)
         names = *(f"atmosphere/turb-{axis}-fps" for axis in ("north", "east", "down")), "atmosphere/q-turb-rad_sec"
         table = np.empty((round(900.0 / step), len(names)))

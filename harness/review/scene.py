@@ -47,7 +47,7 @@ def log_target(to: Recorder, log: FlightLog) -> None:
     """Where the target is, and where the law takes it to be."""
     rows = _every(_MOVES, log)
     to.columns("/target/position", log["time"][rows], rr.Transform3D.columns(translation=_ground(log)[rows]))
-    if log.flight.estimator.kind == "ekf":
+    if log.flight.estimator.filters:
         seen = np.column_stack([log["target_north_seen"], log["target_east_seen"], np.zeros(len(log))])
         new = np.isfinite(log["innovation_range"])
         where = rr.Transform3D.columns(translation=seen[new])
@@ -70,7 +70,7 @@ def log_airframe(to: Recorder, one: StyledFlight, flights: Sequence[StyledFlight
     entity = to.flight(one.name)
     to.once(f"{entity}/vehicle/body/far", airframe(one.log.flight, enlargement(flights), one.colour))
     to.once(f"{entity}/vehicle/body/near", airframe(one.log.flight, _NEAR, one.colour))
-    if one.log.flight.estimator.kind == "ekf":
+    if one.log.flight.estimator.filters:
         to.once("/target/estimate/point", rr.Points3D([(0.0, 0.0, 0.0)], colors=ESTIMATE, radii=-4.0))
         beside = np.array((0.0, 0.7 * one.log.flight.law.standoff, 0.0))  # clear of the target's label
         to.once("/target/estimate/label", _label([beside], ESTIMATE, 0.1, "estimate"))

@@ -14,7 +14,7 @@ _AXES = ("north", "east")
 
 def target_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
     """Position and velocity of the target; where a flight estimates them, also the errors and the innovations."""
-    estimating = [one for one in flights if one.log.flight.estimator.kind == "ekf" and len(one.log)]
+    estimating = [one for one in flights if one.log.flight.estimator.filters and len(one.log)]
     plots = []
     if estimating:
         plots += [_position_error(axis, estimating, flights) for axis in _AXES]

@@ -112,7 +112,7 @@ class _Seen:
 
 
 def _one(flight: Flight) -> _One:
-    random = flight.estimator.kind != "truth" or flight.wind.turbulence != "none"
+    random = flight.estimator.filters or flight.wind.turbulence != "none"
     start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
     return _One(tuple(warnings(flight)), random, typical_wall_time(flight), flight.periods, start)
 

@@ -33,6 +33,6 @@ def typical_wall_time(flight: Flight) -> float:
     seconds += cost.start + max(flight.periods, flight.duration / 0.05) * cost.period + steps * cost.step
     if flight.wind.turbulence != "none":
         seconds += steps * _GUST
-    if flight.estimator.kind == "ekf":
+    if flight.estimator.filters:
         seconds += flight.duration / flight.estimator.period * _SAMPLE
     return seconds

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from autopilot.estimator import Estimator
+from autopilot.estimator import Estimator, ekf
 from harness.knowledge import sensor
 from harness.studies.paper.experiments import EXPERIMENTS
 from harness.world.randomness import stream
@@ -58,7 +58,7 @@ def examine(case: Case, seeds: int = SEEDS) -> Consistency:
 
 def _run(case: Case, seed: int) -> tuple[Array, Array, Array, Array]:
     truth = case.motion(seed)
-    measure, tracker = sensor(case.estimator, seed), case.estimator.start()
+    measure, tracker = sensor(case.estimator, seed), ekf(case.estimator)
     states, covariances, nis = [], [], []
     for x, x_dot, y, y_dot in truth.tolist():
         innovation = tracker.update(measure(TargetState(x, y, x_dot, y_dot)))

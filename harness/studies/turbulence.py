@@ -18,6 +18,7 @@ from harness.files import replacing
 from harness.runs.results import load_results
 from harness.world.air import Array
 from harness.world.turbulence import dryden, turbulence
+from harness.world.wind import SEVERITIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,7 @@ SHOWN = {  # metric: heading, decimals
     "range_error_rms_m": ("circle m rms", 2),
 }
 GROUPED_BY = ["wind.turbulence", "wind.rotation", "aircraft", "start.airspeed_mps"]
-_SEVERITIES = ("light", "moderate", "severe")
+_SEVERITIES: list[object] = list(SEVERITIES)
 _MODEL, _SPAN, _HOURS, _STEPS = dryden("moderate", 13.0, 150.0), 1.27, 8, (0.005, 0.05)
 
 

@@ -14,6 +14,7 @@ from harness.error import HarnessError
 from harness.metric import METRICS
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting
+from harness.world.wind import SEVERITIES
 
 LOST = (Outcome.GROUND.value, Outcome.DEPARTED.value, Outcome.TARGET_LOST.value)
 FAILED = tuple(outcome.value for outcome in Outcome if outcome.failed)
@@ -120,6 +121,7 @@ def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     for name, metric in METRICS.items():
         if name == "convergence_time_s" or not metric.compared:
             continue
+        table[name] = table[name].to_numpy(float, na_value=np.nan)  # what is true or false counts as 1 or 0
         measured = table[name].dropna()
         has_it = table["plant"].isin(set(table["plant"][measured.index]))
         worst = _worst(measured, metric.ideal) if metric.worst is None else metric.worst
@@ -180,7 +182,7 @@ def axes(table: pd.DataFrame, without: Iterable[str] = ("plant", "aircraft")) ->
     return {column: ordered(table[column]) for column in found}
 
 
-SEVERITY = ("none", "light", "moderate", "severe")
+SEVERITY = tuple(SEVERITIES)
 
 
 def ordered(values: pd.Series) -> list[object]:

@@ -8,7 +8,6 @@ empirical formulas take the height in feet; that conversion is the only one here
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +16,9 @@ from scipy.signal import lfilter
 
 from harness.world.air import Array
 from harness.world.randomness import stream
+from harness.world.wind import SEVERITIES
 
-KNOT = 0.514444  # m/s
 FOOT = 0.3048  # m, for the standard's formulas
-# The wind speed 20 ft above the ground that defines each severity, m/s.
-W20 = MappingProxyType({"light": 15.0 * KNOT, "moderate": 30.0 * KNOT, "severe": 45.0 * KNOT})
 LEAD = 2.0  # s: the field begins this long before the flight, so that the filters of the rotation have settled
 
 
@@ -75,7 +72,7 @@ def dryden(severity: str, airspeed: float, altitude: float) -> Dryden:
     """MIL-F-8785C, 3.7.3.4, low altitude: scale lengths and intensities from the height above ground, m."""
     h = altitude / FOOT
     shape = 0.177 + 0.000823 * h
-    sigma_w = 0.1 * W20[severity]
+    sigma_w = 0.1 * SEVERITIES[severity]
     return Dryden(airspeed, sigma_w, sigma_w / shape**0.4, altitude, altitude / shape**1.2)
 
 

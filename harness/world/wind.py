@@ -2,17 +2,21 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Le
 
-from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre, Seconds
+from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre, OneOf, Seconds
 from harness.world.air import Air, Array
 
 _Gusty = Annotated[MetresPerSecond, Ge(-100), Le(100)]
 
 
+KNOT = 0.514444  # m/s
+# The severities of turbulence, weakest first, and the wind speed 20 ft above the ground that defines each, m/s.
+SEVERITIES = MappingProxyType({"none": 0.0, "light": 15.0 * KNOT, "moderate": 30.0 * KNOT, "severe": 45.0 * KNOT})
 LOWEST, HIGHEST = 3.048, 304.8  # m, 10 and 1000 ft above ground: where the turbulence's low-altitude model holds
 
 
@@ -42,7 +46,7 @@ class Wind:
         About("change of the steady wind per metre above the start's altitude"),
     ] = (0.0, 0.0)
     gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; overlapping ones add up")] = ()
-    turbulence: Annotated[Literal["none", "light", "moderate", "severe"], About("MIL-F-8785C, low altitude")] = "none"
+    turbulence: Annotated[str, OneOf(tuple(SEVERITIES)), About("MIL-F-8785C, low altitude")] = "none"
     rotation: Annotated[bool, About("the turbulence also turns the air over a 6-DOF aircraft's wing")] = True
 
     def start(self, *, airspeed: float, altitude: float, step: float, duration: float, seed: int) -> Air:
