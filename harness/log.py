@@ -42,7 +42,7 @@ _TRAJECTORY = [COLUMNS.index(name) for name in TRAJECTORY]
 _ROWS_AT_ONCE = 128
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # equal flights have equal digests
 class FlightLog:
     """A flight and what happened, one row per guidance period: `len(log)` rows, also of a flight that ended early.
 
@@ -80,6 +80,11 @@ class FlightLog:
     outcome: Outcome
     reason: str  # why it ended early, or empty
     table: NDArray[np.float64]  # (rows, len(COLUMNS))
+
+    def __repr__(self) -> str:
+        flown = f"{self['time'][-1]:g} s of " if len(self) else ""
+        law, plant = type(self.flight.law).__name__, self.flight.plant
+        return f"<FlightLog: {flown}{law} on {plant}, {self.flight.aircraft}, {self.outcome}, {len(self)} rows>"
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         """The column, (rows,). KeyError for a name that is none of `COLUMNS`."""

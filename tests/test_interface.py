@@ -233,6 +233,11 @@ def test_a_law_that_there_is_not_is_answered_with_those_there_are(make: Callable
 # Logs
 
 
+def test_a_log_shows_itself_in_one_line(log: harness.FlightLog) -> None:
+    assert repr(log) == "<FlightLog: 20 s of Nftsm on sixdof, ultra_stick_25e, completed, 401 rows>"
+    assert repr(replace(log, table=log.table[:0])) == "<FlightLog: Nftsm on sixdof, ultra_stick_25e, completed, 0 rows>"
+
+
 def test_the_frame_has_every_column_and_is_a_copy(log: harness.FlightLog) -> None:
     frame = log.frame()
     assert tuple(frame.columns) == COLUMNS
