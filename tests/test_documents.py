@@ -18,6 +18,7 @@ from typing import NamedTuple
 import pytest
 
 from docs.write_reference import FOLDER, pages
+from harness import __all__ as public_names
 from harness.cli.main import harness, load
 from harness.log import COLUMNS
 
@@ -160,6 +161,11 @@ def test_every_command_and_option_that_a_page_names_exists(page: Path) -> None:
 def test_every_column_of_a_log_is_explained() -> None:
     explained = set(re.findall(r"`(\w+)`", (FOLDER / "files.md").read_text(encoding="utf-8")))
     assert set(COLUMNS) <= explained
+
+
+def test_every_public_name_is_in_the_python_reference() -> None:
+    named = re.findall(r"auto\w+:: (\w+)$", (FOLDER / "python.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(named) == sorted(["harness", *public_names])
 
 
 def test_the_layers_in_the_text_are_those_that_the_linter_holds() -> None:
