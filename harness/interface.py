@@ -117,7 +117,8 @@ def run(
     - `progress`: print how far it is to standard error, once a second.
 
     Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
-    used; `WorkersError` when the processes cannot fly. A flight that fails is a row, not an error.
+    used; `WorkersError` when the processes cannot fly; ValueError for an option that there is not. A flight that fails
+    is a row, not an error.
 
     >>> results = harness.run("experiments/gains.toml", out="out/gains", progress=True)
     >>> results.groupby("plant")["convergence_time_s"].median()
@@ -129,6 +130,11 @@ def run(
     from harness.runs.survey import survey
     from harness.settings import read_settings
 
+    for name, value, least in (("workers", workers, 0), ("limit", limit, 1)):
+        if value is not None and value < least:
+            raise ValueError(f"{name} is {value}, must be None or at least {least}")
+    if timeout is not None and not timeout > 0.0:
+        raise ValueError(f"timeout is {timeout:g}, must be None or above 0 s")
     if log is not None and log not in LOGS:
         raise ValueError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
     path, out = Path(path), Path(out)

@@ -334,6 +334,16 @@ def test_an_interrupted_run_keeps_its_flights(tmp_path: Path, monkeypatch: pytes
     assert len(harness.load_results(tmp_path / "out")) == 2
 
 
+def test_a_script_that_starts_workers_unguarded_is_told_how_to_guard_them(tmp_path: Path) -> None:
+    file = write(tmp_path / "matrix.toml", MATRIX)
+    script = write(
+        tmp_path / "script.py", f"import harness\nharness.run({str(file)!r}, {str(tmp_path / 'out')!r}, workers=1)"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 1
+    assert 'a Python script must call harness.run under `if __name__ == "__main__":`' in done.stderr.splitlines()[-1]
+
+
 def test_progress_is_printed_when_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write(tmp_path / "matrix.toml", MATRIX)
     harness.run(file, tmp_path / "silent", workers=0)
@@ -349,8 +359,19 @@ def test_a_run_of_a_wrong_file_flies_nothing(tmp_path: Path) -> None:
     with pytest.raises(harness.SettingsError, match=r"matrix.toml:6: .*did you mean 'lagged'"):
         harness.run(file, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_an_option_of_a_run_that_there_is_not_says_what_is_allowed(tmp_path: Path) -> None:
+    file = write(tmp_path / "matrix.toml", MATRIX)
     with pytest.raises(ValueError, match="log is 'every', must be None or one of all, sample, failed, none"):
         harness.run(file, tmp_path / "out", log="every")
+    with pytest.raises(ValueError, match="workers is -1, must be None or at least 0"):
+        harness.run(file, tmp_path / "out", workers=-1)
+    with pytest.raises(ValueError, match="limit is 0, must be None or at least 1"):
+        harness.run(file, tmp_path / "out", limit=0)
+    with pytest.raises(ValueError, match="timeout is 0, must be None or above 0 s"):
+        harness.run(file, tmp_path / "out", timeout=0.0)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_directory_without_results_is_a_store_error(tmp_path: Path) -> None:

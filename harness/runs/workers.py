@@ -190,7 +190,10 @@ class _Flying:
         """Replaces all workers; the chunks of the old ones are flown again."""
         self.restarts += 1
         if self.restarts > _MOST_RESTARTS:
-            raise WorkersError("the worker processes end as soon as they are started")
+            raise WorkersError(
+                "the worker processes end as soon as they are started; a Python script must call harness.run under "
+                '`if __name__ == "__main__":`'
+            )
         self._stop()
         for chunk in self.out.values():
             self.slots.append(chunk.slot)
