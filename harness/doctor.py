@@ -40,10 +40,18 @@ def examine() -> Iterator[SelfTest]:
         airframe = aircraft.folder(name)
         start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=1.0)
         error = max(wind_triangle_error(airframe, start, Air(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0)))
-        yield SelfTest(f"wind, {name}", f"v_ground - v_air - wind: {error:.1e} m/s", error < WIND_TOLERANCE)
+        yield SelfTest(
+            f"wind, {name}",
+            f"v_ground - v_air - wind is {error:.1e} m/s, at most {WIND_TOLERANCE:g} allowed",
+            error < WIND_TOLERANCE,
+        )
         units = compare_units(airframe)
         what, error = max(((u.quantity, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
-        yield SelfTest(f"units, {name}", f"{len(units)} quantities, worst {error:.1e} ({what})", error < UNIT_TOLERANCE)
+        yield SelfTest(
+            f"units, {name}",
+            f"{len(units)} quantities, largest error {error:.1e} in {what}, at most {UNIT_TOLERANCE:g} allowed",
+            error < UNIT_TOLERANCE,
+        )
 
 
 def wind_triangle_error(airframe: Path, start: Start, air: Air) -> float:

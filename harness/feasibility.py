@@ -46,11 +46,11 @@ def feasibility_margin(flight: Flight) -> float:
 def feasibility_line(flight: Flight) -> str:
     """One line: whether the circle can be held, and by what margin."""
     margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
-    of = " of course" if flight.law.command == "course_rate" else ""
-    verdict = "feasible" if margin >= 0 else "INFEASIBLE"
+    rate = flight.law.command.replace("_", " ")
     return (
-        f"circle {verdict}: holding it takes up to {needed:.2f} deg/s{of}, "
-        f"the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s (margin {margin:+.2f})"
+        f"The circle is {'feasible' if margin >= 0 else 'INFEASIBLE'}: holding it takes a {rate} of up to "
+        f"{needed:.2f} deg/s, the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s "
+        f"(margin {margin:+.2f} deg/s)."
     )
 
 
@@ -65,7 +65,7 @@ def warnings(flight: Flight) -> list[str]:
             f"Remark 1 requires v_t + v_w < v_a; here v_t + v_w is {ratio * v_a:.3g} m/s and v_a is {v_a:g} m/s"
         )
     if feasibility_margin(flight) < 0:
-        sentences.append("the circle is infeasible: holding it takes more than the limit")
+        sentences.append("the circle is infeasible: holding it takes more than the heading-rate limit")
     plant = PLANTS[flight.plant]
     setup = setup_of(flight)
     sentences += plant.warnings(setup)
@@ -73,11 +73,11 @@ def warnings(flight: Flight) -> list[str]:
         limits = aircraft.limits(setup.airframe)
         if not limits.slowest <= v_a <= limits.fastest:
             envelope = f"{limits.slowest:g} to {limits.fastest:g} m/s"
-            sentences.append(f"{v_a:g} m/s is outside the airframe's envelope, {envelope}")
+            sentences.append(f"the airspeed, {v_a:g} m/s, is outside the airframe's envelope, {envelope}")
         needed = bank_of_turn(v_a, flight.law.max_heading_rate)
         if needed > limits.bank:
             sentences.append(
                 f"the heading-rate limit needs {math.degrees(needed):.0f} deg of bank, the inner loop allows "
-                f"{math.degrees(limits.bank):.0f}"
+                f"{math.degrees(limits.bank):.0f} deg"
             )
     return sentences + flight.law.broken_conditions(ratio)

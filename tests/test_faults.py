@@ -204,7 +204,7 @@ def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: P
     assert time.monotonic() - begin < 2.0
     assert process.returncode == 130, errors
     assert ended(process.pid, within=0.2), session(process.pid)
-    assert "the same command goes on" in errors
+    assert "the same command resumes the run" in errors
     assert errors.splitlines()[-1] == "interrupted"
     assert "Traceback" not in errors
     assert len(harness.load_results(tmp_path / "out")) > 0

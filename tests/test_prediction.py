@@ -141,7 +141,7 @@ def test_a_quicker_response_is_the_same_in_scaled_time() -> None:
 def test_the_command_tells_the_cycle_and_what_would_end_it() -> None:
     result = invoke("predict", EXPERIMENT)
     assert result.exit_code == 0, result.output
-    for told in ("critical gain", "limit cycle: 0.6", "times as quick", "border for this inner loop: k2 = 2.59,"):
+    for told in ("critical gain", "limit cycle: 0.6", "times as fast", "up to gains of k2 = 2.59,"):
         assert told in result.output
     calm = invoke("predict", EXPERIMENT, "--set", "law.name=smc", "--set", "law.gains=paper")
     assert "no limit cycle" in calm.output

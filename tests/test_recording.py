@@ -94,7 +94,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read_recording(tmp_path / "none.rrd")
     (tmp_path / "text.rrd").write_text("north, east\n" * 100)
-    with pytest.raises(ValueError, match=r"text\.rrd is no whole recording"):
+    with pytest.raises(ValueError, match=r"text\.rrd: is not a complete recording"):
         read_recording(tmp_path / "text.rrd")
 
 

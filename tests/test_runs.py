@@ -19,10 +19,10 @@ import pytest
 
 import harness
 from harness.metric import METRICS, YES_OR_NO
+from harness.runs.description import description
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, export, mixed_versions
 from harness.runs.store import JOURNAL, find, reading
-from harness.runs.story import story
 from harness.settings import read_settings
 from tests.builders import EXPERIMENTS, HERE, ROOT, command, copied_airframe, digests, fly_matrix, words_of, write
 
@@ -151,15 +151,16 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
     for word in ("The flight lasted its full duration.", "sixdof ultra_stick_25e", "bank_peak_deg", row["digest"]):
         assert word in told.stdout
     listed = command("show", out).stdout.splitlines()
-    assert len(listed) == 1 + 10
-    assert [row["key"][:8], "sixdof", "0"] == listed[2].split()[:3]
+    assert len(listed) == 3 + 10  # a heading of two lines and a rule
+    assert [row["key"][:8], "sixdof", "0"] == listed[4].split()[:3]
 
 
-def test_a_story_tells_the_air_that_the_flight_met(file: Path, tmp_path: Path) -> None:
+def test_a_description_names_the_air_that_the_flight_met(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     fly_matrix(file, out, "seed=0", "plant=kinematic", "wind.turbulence=light", "wind.steady_mps=[3.0, 0.0]")
-    told = list(story(out, find(out, harness.load_results(out)["key"][0])))
-    assert any("in wind of 3 m/s north, 0 m/s east and light turbulence, seed 0" in line for line in told)
+    told = list(description(out, find(out, harness.load_results(out)["key"][0])))
+    (line,) = (line for line in told if line.startswith("law "))
+    assert "wind of 3 m/s towards north and 0 m/s towards east, light turbulence, seed 0" in line
 
 
 @pytest.mark.parametrize("key", ["", "zz", "f" * 40])

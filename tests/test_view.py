@@ -105,17 +105,17 @@ def test_an_exported_log_is_the_flight_to_the_last_bit(plant: str, out: Path, tm
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["view", "{out}"], "which flights? Name them with --flight KEY"),
+        (["view", "{out}"], "choose flights with --flight KEY or --pair KEY"),
         (["view", "{out}", "--flight", "zz"], "no flight has a key that begins with 'zz'"),
-        (["view", "{out}", "--flight", "a", "--pair", "b"], "--pair or --flight, not both"),
-        (["view", "{out}", *["--flight", "a"] * 7], "7 flights: up to 6 can be told apart"),
-        (["view", "no/such/place"], "no/such/place: there is no such file or directory"),
-        (["view", "--save", "a.rrd"], "of which directory or file?"),
-        (["view", "{out}/journal.sqlite", "--flight", "a"], "is no whole recording"),
-        (["view", "{out}/journal.sqlite", "--pair", "a"], "is one file"),
+        (["view", "{out}", "--flight", "a", "--pair", "b"], "--pair and --flight exclude each other"),
+        (["view", "{out}", *["--flight", "a"] * 7], "--flight is given 7 times, must be at most 6"),
+        (["view", "no/such/place"], "no/such/place: no such file or folder"),
+        (["view", "--save", "a.rrd"], "--save require a folder or a file"),
+        (["view", "{out}/journal.sqlite", "--flight", "a"], "is not a complete recording"),
+        (["view", "{out}/journal.sqlite", "--pair", "a"], "--pair is for a folder"),
         (["export", "{out}:zz", "--to", "csv"], "no flight has a key that begins with 'zz'"),
         (["export", "nothing.rrd", "--to", "csv"], "nothing.rrd: No such file or directory"),
-        (["fly", "experiments/stationary.toml", "--pace", "2"], "--pace and --port are of --live"),
+        (["fly", "experiments/stationary.toml", "--pace", "2"], "--pace and --port require --live"),
     ],
 )
 def test_bad_input_is_one_line(words: list[str], said: str, out: Path) -> None:

@@ -95,7 +95,7 @@ def _fly(matrix: Matrix, out: Path, options: Options) -> Progress:
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left to do takes no time
         kept = progress.earlier + progress.done if progress else 0
-        click.echo(f"{counted(kept, 'flight')} are kept in {out}; the same command resumes the run", err=True)
+        click.echo(f"kept in {out}: {counted(kept, 'flight')}; the same command resumes the run", err=True)
         raise
     assert progress
     return progress
@@ -110,7 +110,7 @@ def _print_results(matrix: Matrix, out: Path, progress: Progress) -> None:
 
     results = summary(matrix, out, _MOST_LINES)
     metrics = [metric for metric in METRICS.values() if metric.in_short_tables]
-    axes = [", ".join(key.rpartition(".")[2] for key in keys.split(", ")) for keys in results.axes]
+    axes = [keys.replace(", ", ",\n") for keys in results.axes]
     ended = any(set(line.outcomes) != {"completed"} for line in results.lines)
     headings = [*axes, "settled", *(metric.column_heading for metric in metrics), *(["ended"] if ended else [])]
     rows = []

@@ -8,15 +8,16 @@ import click
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--baseline", default="kinematic", show_default=True, help="The plant that the others are compared with.")
-@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Another margin; repeatable.")
-@click.option("--json", "form", flag_value="json", help="Everything as one JSON object on stdout.")
-@click.option("--csv", "form", flag_value="csv", help="The paired differences, one a line.")
-@click.option("--latex", "form", flag_value="latex", help="The paired differences as a tabular.")
+@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
+@click.option("--json", "form", flag_value="json", help="Print everything as one JSON object.")
+@click.option("--csv", "form", flag_value="csv", help="Print the paired differences as CSV.")
+@click.option("--latex", "form", flag_value="latex", help="Print the paired differences as a LaTeX tabular.")
 def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: str | None) -> None:
-    """Compare the flights of DIR, a directory of `harness run`, that differ in the plant alone.
+    """Compare the flights of a run that differ in the plant alone.
 
-    Paired differences with 95 % intervals, and whether each part of the coordinated-flight assumption holds: within
-    the margins of the table [assess] of the run's settings (`harness list margins`).
+    DIR is a folder that `harness run` wrote. Prints the paired differences with 95 % intervals, and whether each part
+    of the coordinated-flight assumption holds within its margin: the table [assess] of the experiment's file, see
+    `harness list margins`.
 
     \b
     Examples:

@@ -25,6 +25,7 @@ def demo(out: Path) -> None:
     from harness.cli._comparison import read_comparison
     from harness.cli._input import BadInput
     from harness.cli._matrix import fly_matrix, print_survey, surveyed
+    from harness.cli._paths import writable_folder
     from harness.runs.matrix import read_matrix
     from harness.runs.run import Options, positions_done
     from harness.runs.store import StoreError
@@ -32,6 +33,7 @@ def demo(out: Path) -> None:
     from harness.settings import read_settings
     from harness.verdict.words import answer
 
+    writable_folder(out)
     try:
         matrix = read_matrix(read_settings(EXPERIMENT))
         done = positions_done(matrix, out, retry_failed=False)
@@ -45,7 +47,7 @@ def demo(out: Path) -> None:
         click.echo(sentence)
     key = comparison.pairs.other["key"].iloc[0][:8]
     click.echo(
-        f"\nthe whole comparison: harness compare {out}\n"
+        f"\nthe full comparison: harness compare {out}\n"
         f"the first pair in the viewer: harness view {out} --pair {key}\n"
         f"all flights and their keys: harness show {out}\n"
         f"the experiment, to copy and change: {EXPERIMENT}"

@@ -13,15 +13,17 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("what", metavar="DIR:KEY|FILE.rrd")
-@click.option("--to", "kind", type=click.Choice(["csv", "parquet"]), required=True, help="The form.")
+@click.option("--to", "kind", type=click.Choice(["csv", "parquet"]), required=True, help="Format of the table.")
 @click.option("--flight", metavar="NAME", help="Which flight of a FILE.rrd that holds several.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="The file.  [default: KEY or FILE, with the form's suffix]"
+    "--out", type=click.Path(path_type=Path), help="The file.  [default: KEY or FILE, with the format's suffix]"
 )
 def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
-    """Write the log of a flight, a row per guidance period: SI, rad, north-east-down; empty where there is no number.
+    """Write the log of a flight as a CSV or Parquet table.
 
-    A row without a recording is flown again, and compared with what is stored. CSV has every digit of a double.
+    One row for each guidance period; SI units, rad, north-east-down; a cell is empty where the plant has no such
+    quantity. CSV has every digit of a double. A flight of a run without a recording is flown again and compared with
+    what is stored. Prints the file, its rows and its columns.
 
     \b
     Examples:
@@ -56,9 +58,13 @@ def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
             from harness.runs.logs import flight_of_row
 
             if flight is not None:
-                raise BadInput(f"{what}: is one flight; --flight is for a FILE.rrd")
+                raise BadInput(f"{what}: is one flight already; --flight is for a FILE.rrd")
             log = flight_of_row(place.folder, place.beginning, lambda line: click.echo(line, err=True))
             return pd.DataFrame(log.table, columns=list(COLUMNS)), find(*place).row["key"]
+        if Path(what).is_dir():
+            raise BadInput(
+                f"{what}: is a folder; a flight in it is {what}:KEY, and `harness show {what}` lists the keys"
+            )
         from harness.review.reading import read_recording
 
         return read_recording(Path(what), flight), Path(what).stem

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,12 +15,14 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("what", metavar="FILE|DIR:KEY")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
-@click.option("--rrd", type=click.Path(path_type=Path), help="Write a Rerun recording there.")
-@click.option("--live", is_flag=True, help="Stream to an open viewer (`harness view`) while flying.")
-@click.option("--pace", type=click.FloatRange(0, min_open=True), help="Times real time, with --live.  [default: 1]")
-@click.option("--port", type=click.IntRange(1, 65535), help="Where the viewer listens, with --live.  [default: 9876]")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout instead of the table.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
+@click.option("--rrd", type=click.Path(path_type=Path), help="Write a Rerun recording to this file.")
+@click.option("--live", is_flag=True, help="Stream the flight to an open viewer, `harness view`.")
+@click.option(
+    "--pace", type=click.FloatRange(0, min_open=True), help="Speed of --live, in times real time.  [default: 1]"
+)
+@click.option("--port", type=click.IntRange(1, 65535), help="Port of the viewer, for --live.  [default: 9876]")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def fly(
     what: str,
     overrides: tuple[str, ...],
@@ -31,9 +32,11 @@ def fly(
     port: int | None,
     as_json: bool,
 ) -> None:
-    """Fly the flight that FILE describes, or again a row of a run, and print its metrics.
+    """Fly one flight and print its metrics.
 
-    A row without --set is compared with what is stored. The beginning of its key is enough.
+    FILE describes the flight; DIR:KEY is a flight of a run, flown again and compared with what is stored, where the
+    beginning of the key is enough. Prints whether the circle can be held, a table of metrics, the outcome, the key
+    and the digest; warnings go to standard error. Exit code 1 when the computation failed.
 
     \b
     Examples:
@@ -49,14 +52,15 @@ def fly(
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
     from harness.loop import simulate
+    from harness.runs.description import metric_lines
     from harness.runs.recall import row_address
     from harness.runs.row import result_of, row
 
     if not live and (pace is not None or port is not None):
-        raise BadInput("--pace and --port are of --live: add it")
+        raise BadInput("--pace and --port require --live")
     place = row_address(what)
     if not place and Path(what).is_dir():
-        raise BadInput(f"{what}: is a directory; a flight of it is {what}:KEY, by `harness show {what}`")
+        raise BadInput(f"{what}: is a folder; a flight in it is {what}:KEY, and `harness show {what}` lists the keys")
     recalled = _recalled(place) if place else None
     settings = recalled.file(what, overrides) if recalled else read_file(Path(what), overrides)
     flight = flight_of(settings)
@@ -83,12 +87,15 @@ def fly(
     if as_json:
         click.echo(json.dumps(flight_row, allow_nan=False))
     else:
-        _tell(flight_row)
+        for line in metric_lines(flight_row["metrics"]):
+            click.echo(line)
+        click.echo(f"outcome: {log.outcome}{f': {log.reason}' if log.reason else ''}")
+        click.echo(f"key {flight_row['key']}  digest {flight_row['digest']}")
     raise SystemExit(1 if log.outcome.failed else 0)
 
 
 def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live:
-    """To the viewer that is open. At once an error when there is none."""
+    """The stream to the viewer that is open. Raises `BadInput` when there is none."""
     from harness.cli._input import BadInput
     from harness.review.live import Live
     from harness.review.viewer import PORT, ViewerError
@@ -115,23 +122,10 @@ def _compare(recalled: Recalled, result: FlightResult) -> None:
     from harness.runs.recall import deviation
 
     if not recalled.digest:
-        click.echo(f"the row has no digest to compare with: it ended in {recalled.stored.row['outcome']}", err=True)
+        click.echo(
+            f"the stored flight ended in {recalled.stored.row['outcome']} and has no digest to compare with", err=True
+        )
     elif apart := deviation(recalled.stored, result):
         click.echo(f"warning: differs from the stored flight ({recalled.changes}): {apart}", err=True)
     else:
         click.echo("the same flight as stored, to the last bit", err=True)
-
-
-def _tell(flight_row: Mapping[str, Any]) -> None:
-    from harness.metric import METRICS, window_in_words
-    from harness.tables import number, table
-
-    metrics = flight_row["metrics"]
-    rows = ([name, number(value), click.style(METRICS[name].meaning, dim=True)] for name, value in metrics.items())
-    for line in table([], rows, "lrl"):
-        click.echo(f"  {line}")
-    if judged := window_in_words(metrics):
-        click.echo(judged)
-    reason = f": {flight_row['reason']}" if flight_row["reason"] else ""
-    click.echo(f"{flight_row['outcome']}{reason}")
-    click.echo(f"key {flight_row['key']}  digest {flight_row['digest']}")

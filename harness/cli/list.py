@@ -1,4 +1,4 @@
-"""`harness list`: what there is."""
+"""`harness list`: what is declared."""
 
 from __future__ import annotations
 
@@ -7,43 +7,42 @@ from collections.abc import Callable, Iterator, Mapping
 import click
 
 
-@click.command("list")
-@click.argument("kind", type=click.Choice(["laws", "aircraft", "plants", "metrics", "margins"]))
-def list_(kind: str) -> None:
-    """List what there is of KIND: laws with their gains, aircraft, plants, metrics, or the margins of the verdict.
-
-    \b
-    Example:
-      harness list laws
-    """
-    for line in _LINES[kind]():
-        click.echo(line)
-
-
 def _laws() -> Iterator[str]:
     from autopilot.laws import LAWS
+    from harness.tables import number, table
 
-    for name, law in LAWS.items():
+    for i, (name, law) in enumerate(LAWS.items()):
+        yield from [""] * bool(i)
         yield f"{name}: {(law.value.__doc__ or '').splitlines()[0]}"
-        for gains, values in law.gain_sets.items():
-            default = " (default)" if gains == law.default else ""
-            yield f"    {gains}{default}: " + ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
+        gains = list(dict.fromkeys(key for values in law.gain_sets.values() for key in values))
+        rows = (
+            [f"{chosen} (default)" if chosen == law.default else chosen, *(number(values.get(key)) for key in gains)]
+            for chosen, values in law.gain_sets.items()
+        )
+        yield from table(["gain set", *gains], rows, "lr")
 
 
 def _aircraft() -> Iterator[str]:
-    import aircraft
+    import math
 
+    import aircraft
+    from harness.tables import number, table
+
+    rows = []
     for name in aircraft.names():
         airframe = aircraft.folder(name)
-        meta, speed = aircraft.data(airframe)["meta"], aircraft.limits(airframe).design_airspeed
-        yield f"{name}: {meta['long_name']}, {meta['layout']}; {speed:g} m/s"
+        meta, limits = aircraft.data(airframe)["meta"], aircraft.limits(airframe)
+        speeds = (number(speed) for speed in (limits.design_airspeed, limits.slowest, limits.fastest))
+        rows.append([name, *speeds, number(math.degrees(limits.bank)), f"{meta['long_name']}: {meta['layout']}"])
+    headings = ["aircraft", "airspeed\nm/s", "slowest\nm/s", "fastest\nm/s", "bank limit\ndeg", "what it is"]
+    yield from table(headings, rows, "lrrrrl")
 
 
 def _plants() -> Iterator[str]:
     from harness.plants.ladder import PLANTS
+    from harness.tables import table
 
-    for name, plant in PLANTS.items():
-        yield f"{name}: {plant.about}"
+    yield from table(["plant", "what it is"], ([name, plant.about] for name, plant in PLANTS.items()))
 
 
 def _metrics() -> Iterator[str]:
@@ -60,18 +59,37 @@ def _margins() -> Iterator[str]:
     from harness.margins import Assess
     from harness.settings.table import schema_of
     from harness.settings.written import written
+    from harness.tables import number, table
 
     hints = get_type_hints(Assess, include_extras=True)
+    rows = []
     for key, value in written(Assess()).items():
         hint = hints[schema_of(Assess).settings[key].name]
-        about = next(mark.text for mark in get_args(hint) if isinstance(mark, About))
-        yield f"{f'assess.{key} = {value:.4g}':50} {about}"
+        rows.append([f"assess.{key}", number(value), next(m.text for m in get_args(hint) if isinstance(m, About))])
+    yield from table(["margin", "default", "what it bounds, and where its default comes from"], rows, "lrl")
 
 
-_LINES: Mapping[str, Callable[[], Iterator[str]]] = {
+_KINDS: Mapping[str, Callable[[], Iterator[str]]] = {
     "laws": _laws,
     "aircraft": _aircraft,
     "plants": _plants,
     "metrics": _metrics,
     "margins": _margins,
 }
+
+
+@click.command("list")
+@click.argument("kind", type=click.Choice(list(_KINDS)))
+def list_(kind: str) -> None:
+    """List the laws, aircraft, plants, metrics or margins.
+
+    Prints a table: the laws with their gain sets, the aircraft with their limits, the plants from the kinematic one
+    up, the metrics with their units and meaning, or the margins of the verdict with their defaults.
+
+    \b
+    Examples:
+      harness list laws
+      harness list margins
+    """
+    for line in _KINDS[kind]():
+        click.echo(line)

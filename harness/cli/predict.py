@@ -7,11 +7,13 @@ import click
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; may be repeated.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
 def predict(file: Path, overrides: tuple[str, ...]) -> None:
-    """Predict, without flying, the limit cycle of the flight that FILE describes, on its circle in still air.
+    """Predict the limit cycle of a flight without flying it.
 
-    And what would end it: how quick the inner loop has to be for these gains, and how high the gains may be for it.
+    The flight is the one that FILE describes, on its circle in still air, behind the identified inner loop of its
+    airframe. Prints the frequency and the amplitudes of the limit cycle; for NFTSM also how fast the inner loop must
+    be for these gains, and the highest gains that this inner loop bears, without a limit cycle.
 
     \b
     Example:
@@ -44,19 +46,22 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
         f"critical gain {critical_gain(loop.response, loop.period)[0]:.3g} 1/s with a command held {loop.period:g} s"
     )
     if cycle is None:
-        click.echo("no limit cycle: the command swings by less than 0.5 deg/s")
+        click.echo("no limit cycle: the command oscillates by less than 0.5 deg/s")
     else:
         click.echo(
-            f"limit cycle: {cycle.frequency:.3g} Hz, heading rate +-{math.degrees(cycle.heading_rate):.3g} deg/s, "
-            f"command +-{math.degrees(cycle.command):.3g} deg/s, range error "
-            f"{cycle.range_mean:.3g} +-{cycle.range_error:.3g} m"
+            f"limit cycle: {cycle.frequency:.3g} Hz, heading rate ±{math.degrees(cycle.heading_rate):.3g} deg/s, "
+            f"command ±{math.degrees(cycle.command):.3g} deg/s, range error "
+            f"{cycle.range_mean:.3g} ±{cycle.range_error:.3g} m"
         )
     if isinstance(law, Nftsm):
         quicker = boundary(lambda q: replace(loop, response=loop.response.quicker(q)), 4.0)
         gains = boundary(lambda q: replace(loop, law=replace(law, k2=q * law.k2, k3=q * law.k3)), 0.3)
         if math.isfinite(quicker):
             click.echo(
-                f"border for these gains: an inner loop {quicker:.3g} times as quick, {quicker * bandwidth:.3g} rad/s"
+                f"these gains need an inner loop {quicker:.3g} times as fast to have none: bandwidth "
+                f"{quicker * bandwidth:.3g} rad/s"
             )
         if math.isfinite(gains):
-            click.echo(f"border for this inner loop: k2 = {gains * law.k2:.3g}, k3 = {gains * law.k3:.3g} 1/s")
+            click.echo(
+                f"this inner loop has none up to gains of k2 = {gains * law.k2:.3g}, k3 = {gains * law.k3:.3g} 1/s"
+            )

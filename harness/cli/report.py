@@ -7,12 +7,15 @@ import click
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="The page. [default: DIR/report.html]")
-@click.option("--markdown", type=click.Path(path_type=Path), help="Write this instead: the same without figures.")
+@click.option("--out", type=click.Path(path_type=Path), help="The HTML file. [default: DIR/report.html]")
+@click.option("--markdown", type=click.Path(path_type=Path), help="Write this Markdown file instead, without figures.")
 @click.option("--baseline", default="kinematic", show_default=True, help="The plant that the others are compared with.")
-@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Another margin; repeatable.")
+@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
 def report(directory: Path, out: Path | None, markdown: Path | None, baseline: str, overrides: tuple[str, ...]) -> None:
-    """What `harness compare DIR` says as one page with figures that fetches nothing: for a browser, and for paper.
+    """Write the comparison as one HTML page with figures.
+
+    The page says what `harness compare DIR` prints, fetches nothing, and suits a browser and paper. Prints the name
+    of the file.
 
     \b
     Examples:
@@ -27,9 +30,9 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
     from harness.verdict import report as job
 
     if out is not None and markdown is not None:
-        raise BadInput("--out and --markdown are one file each: give one of them")
+        raise BadInput("--out and --markdown exclude each other: each names the one file to write")
     if not directory.is_dir():
-        raise BadInput(f"{directory}: there is no such directory")
+        raise BadInput(f"{directory}: there is no such folder")
     path = writable(markdown or out or directory / "report.html")
     with busy("comparing and drawing"):
         comparison, origin = read_comparison(directory, baseline, overrides)

@@ -46,6 +46,7 @@ def run(
 
     from harness.cli._input import BadInput
     from harness.cli._matrix import fly_matrix, print_survey, print_time, surveyed
+    from harness.cli._paths import writable_folder
     from harness.runs.matrix import read_matrix
     from harness.runs.run import Options, positions_done
     from harness.runs.store import StoreError
@@ -54,8 +55,6 @@ def run(
 
     if out is None and not dry_run:
         raise BadInput("--out DIR is missing: the folder of the results")
-    if out is not None and out.exists() and not out.is_dir():
-        raise BadInput(f"{out}: is a file, not a folder")
     if flight_timeout is not None and not flight_timeout > 0:
         raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
     workers = (os.cpu_count() or 1) if workers is None else workers
@@ -63,6 +62,8 @@ def run(
         matrix = read_matrix(read_settings(file, overrides))
         done = positions_done(matrix, out, retry_failed=retry is not None) if out else frozenset[int]()
         size = surveyed(matrix, limit, done)
+        if out is not None and not dry_run:
+            writable_folder(out)
         print_survey(matrix, size, len(done))
         if dry_run or out is None:
             print_time(size, len(done), max(1, workers), log)

@@ -1,4 +1,4 @@
-"""`harness show`: a row of a run in words, or all of them in lines."""
+"""`harness show`: the flights of a run, or one of them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ _MOST_LINES = 100
 
 
 @click.command()
-@click.argument("row", metavar="DIR:KEY|DIR")
+@click.argument("row", metavar="DIR|DIR:KEY")
 def show(row: str) -> None:
-    """Tell the story of a flight of a run: its settings, its metrics, why it ended, where it comes from.
+    """Show the flights of a run, or one of them in full.
 
-    The beginning of the key is enough. Of a DIR alone, list the flights with their keys and what varies.
+    Of DIR, a folder that `harness run` wrote, prints a table of the flights: the key, the settings that vary and the
+    outcome. Of DIR:KEY prints one flight: how it ended, its metrics, its settings and where it comes from. The
+    beginning of the key is enough.
 
     \b
     Examples:
@@ -23,15 +25,15 @@ def show(row: str) -> None:
       harness show out/wind:3f2a
     """
     from harness.cli._input import BadInput
+    from harness.runs.description import description
     from harness.runs.recall import row_address
     from harness.runs.store import StoreError, find
-    from harness.runs.story import story
 
-    place = row_address(row)
-    if place is None and not Path(row).is_dir():
-        raise BadInput(f"{row}: is no DIR:KEY, a directory of `harness run` and the beginning of a key")
+    address = row_address(row)
+    if address is None and not Path(row).is_dir():
+        raise BadInput(f"{row}: must be DIR or DIR:KEY, a folder that `harness run` wrote and the beginning of a key")
     try:
-        for line in story(place.folder, find(*place)) if place else _flights(Path(row)):
+        for line in description(address.folder, find(*address)) if address else _flights(Path(row)):
             click.echo(line)
     except StoreError as error:
         raise BadInput(str(error)) from None
@@ -40,10 +42,25 @@ def show(row: str) -> None:
 def _flights(folder: Path) -> Iterator[str]:
     """A line for each flight of a run."""
     from harness.runs.results import load_results
+    from harness.tables import table
     from harness.verdict.pairs import varying
 
     results = load_results(folder)
-    table = results.assign(key=results["key"].str[:8])[["key", *varying(results), "outcome"]]
-    yield from table.head(_MOST_LINES).to_string(index=False, float_format="%.6g").splitlines()
-    if len(table) > _MOST_LINES:
-        yield f"... and {len(table) - _MOST_LINES} more; all: harness.load_results({str(folder)!r}) in Python"
+    keys = varying(results)
+    rows = (
+        [flight["key"][:8], *(_cell(flight[key]) for key in keys), flight["outcome"]]
+        for flight in results.head(_MOST_LINES).to_dict("records")
+    )
+    sides = "".join("r" if results[key].dtype.kind in "if" else "l" for key in keys)
+    yield from table(["key", *(key.replace(".", ".\n") for key in keys), "outcome"], rows, f"l{sides}l")
+    if len(results) > _MOST_LINES:
+        yield f"... and {len(results) - _MOST_LINES} more; all flights: harness.load_results({str(folder)!r})"
+
+
+def _cell(value: object) -> str:
+    """A setting: a number without needless digits, a list in brackets, a dash for none."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_cell, value))}]"
+    if isinstance(value, float):
+        return f"{value:.6g}" if value == value else "-"
+    return "-" if value is None else str(value)

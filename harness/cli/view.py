@@ -14,19 +14,19 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("what", metavar="[DIR|DIR:KEY|FILE.rrd]", required=False)
 @click.option(
-    "--flight", "flights", multiple=True, metavar="KEY", help="A flight of it, up to 6; the first is the reference."
+    "--flight", "flights", multiple=True, metavar="KEY", help="A flight to show, up to 6; the first is the reference."
 )
-@click.option("--pair", metavar="KEY", help="The same flight on each plant, the kinematic one the reference.")
-@click.option("--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write the recording; open nothing.")
+@click.option("--pair", metavar="KEY", help="Show this flight on every plant; kinematic is the reference.")
 @click.option(
-    "--port", type=click.IntRange(1, 65535), default=9876, show_default=True, help="Where the viewer listens."
+    "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write this recording; open no viewer."
 )
+@click.option("--port", type=click.IntRange(1, 65535), default=9876, show_default=True, help="Port of the viewer.")
 def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Path | None, port: int) -> None:
-    """Open flights in the Rerun viewer, several in one scene and the same plots.
+    """Open flights in the Rerun viewer.
 
-    The beginning of a KEY is enough; of a FILE.rrd with several flights, KEY is a flight's name. A flight without a
-    recording is flown again from its row, and compared with what is stored. Without arguments an empty viewer opens,
-    for `harness fly --live`.
+    Several flights share one scene and the same plots. The beginning of a KEY is enough; for a FILE.rrd with several
+    flights, KEY is the name of a flight. A flight without a recording is flown again and compared with what is
+    stored. Without arguments an empty viewer opens, for `harness fly --live`. With --save prints the file written.
 
     \b
     Examples:
@@ -41,8 +41,10 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
 
     if what is None:
         if flights or pair or save:
-            raise BadInput("of which directory or file? harness view DIR|FILE.rrd ...")
-        click.echo(f"an empty viewer, for harness fly --live{'' if port == 9876 else f' --port {port}'}", err=True)
+            raise BadInput("--flight, --pair and --save require a folder or a file: harness view DIR|FILE.rrd ...")
+        click.echo(
+            f"opening an empty viewer, for harness fly --live{'' if port == 9876 else f' --port {port}'}", err=True
+        )
         return _open(None, port)
     if save is not None:
         writable(save)
@@ -50,7 +52,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
     if logs is None and save is None:
         return _open(Path(what), port)
     if logs is None:
-        raise BadInput(f"{what}: is a recording already; choose of its flights with --flight NAME")
+        raise BadInput(f"{what}: is a recording already; choose some of its flights with --flight NAME")
 
     from harness.review.recording import write_recording
 
@@ -76,21 +78,21 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
     from harness.settings import SettingsError
 
     if pair is not None and flights:
-        raise BadInput("--pair or --flight, not both")
+        raise BadInput("--pair and --flight exclude each other")
     if len(flights) > MOST:
-        raise BadInput(f"{len(flights)} flights: up to {MOST} can be told apart")
+        raise BadInput(f"--flight is given {len(flights)} times, must be at most {MOST} times")
     path = Path(what)
     if path.is_file():
         if pair is not None:
-            raise BadInput(f"{what}: is one file; --pair is for a directory of `harness run`")
+            raise BadInput(f"{what}: is a file; --pair is for a folder that `harness run` wrote")
         return _of_file(path, flights)
     place = row_address(what)
     if place is not None:
         flights, path = (place.beginning, *flights), place.folder
     elif not path.is_dir():
-        raise BadInput(f"{what}: there is no such file or directory")
+        raise BadInput(f"{what}: no such file or folder")
     elif not flights and pair is None:
-        raise BadInput(f"{what}: which flights? Name them with --flight KEY, or one with --pair KEY")
+        raise BadInput(f"{what}: choose flights with --flight KEY or --pair KEY; `harness show {what}` lists the keys")
     try:
         if pair is not None:
             return distinctly_named(pair_of_row(path, pair, _say))
@@ -100,17 +102,15 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
 
 
 def _rows(folder: Path, keys: tuple[str, ...]) -> list[FlightLog]:
-    from rich.console import Console
-    from rich.progress import track
-
+    from harness.cli._progress import progress
     from harness.runs.logs import flight_of_row
 
-    terminal = Console(stderr=True)
-    quiet = not terminal.is_terminal
-    return [
-        flight_of_row(folder, key, _say)
-        for key in track(keys, "reading", console=terminal, transient=True, disable=quiet)
-    ]
+    logs = []
+    with progress("reading flights", len(keys)) as advance:
+        for key in keys:
+            logs.append(flight_of_row(folder, key, _say))
+            advance()
+    return logs
 
 
 def _of_file(path: Path, names: tuple[str, ...]) -> dict[str, FlightLog] | None:
@@ -125,7 +125,7 @@ def _of_file(path: Path, names: tuple[str, ...]) -> dict[str, FlightLog] | None:
         raise BadInput(str(error)) from None
     for name in names:
         if name not in held:
-            raise BadInput(f"{path}: no flight {name!r}; it holds {', '.join(held)}")
+            raise BadInput(f"{path}: holds no flight {name!r}; it holds {', '.join(held)}")
     return {name: held[name] for name in names}
 
 

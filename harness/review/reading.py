@@ -69,7 +69,7 @@ def _read(path: Path) -> dict[str, _Held]:
     try:
         chunks = RrdReader(path).stream().filter(content="/runs/**").to_chunks()
     except RuntimeError as error:
-        raise ValueError(f"{path} is no whole recording: {error}") from error
+        raise ValueError(f"{path}: is not a complete recording: {error}") from error
     columns: dict[str, list[str]] = {}
     rows: dict[str, list[Array]] = {}
     flights: dict[str, str] = {}

@@ -33,7 +33,7 @@ def flight_of_row(folder: Path, beginning: str, say: Say) -> FlightLog:
     except FileNotFoundError:
         pass
     except (OSError, ValueError) as error:
-        say(f"{key}: its recording cannot be used ({error}): flown again")
+        say(f"{key}: the recording cannot be read ({error}); flown again")
     recalled = recall(RowAddress(folder, key))
     if not digest:
         say(f"{key}: ended in {stored.row['outcome']} without a log: flown again, with no digest to compare with")
@@ -58,7 +58,7 @@ def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
         try:
             logs.append(simulate(flight_from_document({**settings, "plant": plant})))
         except (ValueError, SettingsError) as error:
-            say(f"{plant}: left out, it cannot start: {error}")
+            say(f"{plant}: left out, as the flight cannot start: {error}")
     return logs
 
 

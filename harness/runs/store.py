@@ -230,7 +230,9 @@ def find(folder: Path, beginning: str) -> Stored:
             (len(beginning), beginning),
         ).fetchall()
         if not rows or not beginning:
-            raise StoreError(f"{folder}: no flight has a key that begins with {beginning!r}")
+            raise StoreError(
+                f"{folder}: no flight has a key that begins with {beginning!r}; `harness show {folder}` lists the keys"
+            )
         if len(rows) > 1:
             keys = ", ".join(row["key"] for row in rows[:5]) + (", ..." if len(rows) > 5 else "")
             raise StoreError(f"{folder}: the key {beginning!r} is ambiguous: {keys}")
