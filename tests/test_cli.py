@@ -227,6 +227,7 @@ def test_a_commands_help_imports_that_command_alone() -> None:
         ("list planes", "harness list: Invalid value for '{laws|aircraft|plants|metrics|margins}': 'planes' is not"),
         ("run", "harness run: Missing argument 'FILE'; try"),
         ("run x.toml --wokers 2", "harness run: No such option '--wokers'"),
+        ("run x.toml --out", "harness run: Option '--out' requires an argument; try 'harness run --help'"),
         ("run x.toml --out x --workers two", "harness run: Invalid value for '--workers': 'two' is not"),
         ("run x.toml", "--out DIR is missing"),
         ("run x.toml --out x", "x.toml: No such file or directory"),

@@ -119,7 +119,8 @@ def main() -> None:
 def _print_error(error: click.ClickException) -> None:
     """On one line, also what Click prints on several; the command without any argument prints its help."""
     if isinstance(error, click.UsageError) and not isinstance(error, click.exceptions.NoArgsIsHelpError):
-        command = error.ctx.command_path if error.ctx else "harness"
+        called = [name for name in sys.argv[1:2] if name in _ENTRIES]  # Click names no command for a missing value
+        command = error.ctx.command_path if error.ctx else " ".join(["harness", *called])
         message = " ".join(error.format_message().split()).rstrip(".")
         click.echo(f"{command}: {message}; try '{command} --help'", err=True)
     else:
