@@ -112,18 +112,6 @@ def test_shear_slows_a_climb_into_the_growing_tailwind() -> None:
     assert s.airspeed == pytest.approx(13.0, abs=0.05)
 
 
-def test_the_air_is_the_same_for_every_plant_law_and_guidance_period() -> None:
-    reference = air_of(FLIGHT).gusts
-    others = (
-        replace(FLIGHT, plant="sixdof"),
-        replace(FLIGHT, law=law("nftsm")),
-        replace(FLIGHT, guidance_period=0.5),
-        replace(FLIGHT, aircraft="skywalker_x8"),
-    )
-    for other in others:
-        assert np.array_equal(air_of(other).gusts, reference)
-
-
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
 def test_the_log_shows_the_same_air_on_either_plant(plant: str) -> None:
     log = simulate(replace(FLIGHT, plant=plant, wind=replace(WIND, shear=(0.0, 0.0))))

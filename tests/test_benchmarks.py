@@ -20,6 +20,7 @@ def medians(line: str) -> list[float]:
 def test_a_flight_costs_at_least_its_bare_loop(capsys: pytest.CaptureFixture[str]) -> None:
     flight_speed.main(pairs=1, duration=20)
     _, *airframes, kinematic = lines(capsys)
+    assert len(airframes) == 2 * len(flight_speed.AIRFRAMES)
     for flight in airframes[::2]:
         ratio, seconds = medians(flight)
         assert ratio > 0.8  # that of a loop which does nothing else, but for the clock

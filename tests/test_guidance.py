@@ -111,12 +111,25 @@ def test_smc_unlimited_makes_s_follow_its_reaching_law() -> None:
     assert s_dot == pytest.approx(-0.005 * max(-1.0, min(1.0, s / 0.2)), rel=1e-5)
 
 
-def manifold(ell: float, beta3: float, eta: float) -> tuple[float, float]:
+def manifold(ell: float, beta3: float, eta: float, **gains: float) -> tuple[float, float]:
     """f(ell) of Section 3.3 and its slope, as the law has them: s and the command on the circle's tangent."""
-    g = law("nftsm", "paper_1", beta3=beta3, eta=eta)
+    g = law("nftsm", "paper_1", beta3=beta3, eta=eta, **gains)
     assert isinstance(g, nftsm.Nftsm)
     _, rest, f = nftsm.reaching(g)((math.tan(ell) / g.k1, 1.0, 0.0, 0.0, 0.0))
     return f, -(rest + g.k2 * f + g.k3 * sig(f, g.gamma1)) / (g.k1 * math.cos(ell) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("ell", "f"),
+    [
+        (1.0, 0.6 + 0.8),  # where every power is one
+        (0.25, 0.6 * 0.25**2 + 0.8 * 0.5),
+        (0.02, 0.6 * 0.02**2 + 0.8 * 0.125),  # within eta: 7.5 ell - 62.5 ell^2 in place of the root
+    ],
+)
+def test_the_manifold_has_the_values_of_eq_17_and_is_odd(ell: float, f: float) -> None:
+    values = [manifold(x, 0.5, 0.04, alpha2=0.6, beta2=2.0, alpha3=0.8)[0] for x in (ell, -ell)]
+    assert values == pytest.approx([f, -f], rel=1e-12)
 
 
 @given(beta3=st.floats(0.1, 0.9), eta=st.floats(1e-4, 0.1))

@@ -11,7 +11,7 @@ import pytest
 from harness.runs.matrix import Matrix, read_matrix
 from harness.runs.survey import survey
 from harness.settings import SettingsError, document, read_settings
-from tests.builders import DOCS, EXPERIMENTS, write
+from tests.builders import DOCS, write
 
 FLIGHT = """\
 [flight]
@@ -224,8 +224,3 @@ def test_the_documents_matrix_is_right(matrix: Read) -> None:
     *_, found = survey(m, limit=40)
     assert found.flights == 40
     assert len(m) == 2 * 20 * 6 * 5 * 2 - 6 * 5 * 2 + 20
-
-
-def test_every_shipped_experiment_is_right() -> None:
-    for path in EXPERIMENTS.glob("*.toml"):
-        assert len(read_matrix(read_settings(path))) >= 1

@@ -12,7 +12,6 @@ import pytest
 import aircraft
 from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.laws import law
-from harness.doctor import wind_triangle_error
 from harness.flight import MetricSettings
 from harness.loop import simulate
 from harness.plants.plant import End, Outcome, PlantError, Start
@@ -24,13 +23,6 @@ from tests.builders import FLIGHT, SIXDOF, OwnLaw, command, copied_airframe, tur
 
 STEP = 0.005
 STICK = aircraft.folder("ultra_stick_25e")
-
-
-@pytest.mark.parametrize("name", aircraft.names())
-def test_ground_velocity_is_air_velocity_plus_wind(name: str) -> None:
-    speed = aircraft.limits(aircraft.folder(name)).design_airspeed
-    start = Start(airspeed=speed, heading=2.0)
-    assert wind_triangle_error(aircraft.folder(name), start, Air(steady=(-3.0, 4.0))) < 1e-6
 
 
 def test_position_is_the_integral_of_ground_velocity() -> None:

@@ -175,18 +175,6 @@ def test_a_command_held_longer_than_the_bound_does_not_shrink_s() -> None:
             assert (abs(s_next) < abs(s)) is shrinks
 
 
-def test_the_manifold_is_the_papers_eq_17_along_a_flight() -> None:
-    """With s recomputed from the log's geometry alone, far from and near to the circle."""
-    log = flown(30.0)
-    g = gains()
-    ell = np.arctan(g.k1 * log["range_error"])
-    size, sign = np.abs(ell), np.sign(ell)
-    r1, r2 = (2.0 - g.beta3) * g.eta ** (g.beta3 - 1.0), (g.beta3 - 1.0) * g.eta ** (g.beta3 - 2.0)
-    sigma = np.where(size > g.eta, sign * size**g.beta3, r1 * ell + r2 * sign * size**2)
-    s = log["heading_error"] + g.alpha2 * sign * size**g.beta2 + g.alpha3 * sigma
-    assert log["sliding_variable"] == pytest.approx(s, abs=1e-12)
-
-
 def test_a_flight_on_the_manifold_follows_its_own_differential_equation() -> None:
     """In still air on s = 0: r' = v_a sin(-f(arctan(k1 r))), integrated independently."""
     log = flown(30.0)
