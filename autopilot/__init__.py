@@ -1,1 +1,1 @@
-"""What flies on board: guidance laws in Python, inner loops as a JSBSim system. Knows no simulator."""
+"""The software on board: guidance laws and estimator in Python, the inner loop as a JSBSim system. No simulator."""

@@ -1,10 +1,10 @@
-"""Angles, on plain floats."""
+"""Arithmetic of angles, on plain floats."""
 
 import math
 
 
 def wrap(angle: float) -> float:
-    """The same direction in [-pi, pi). `angle` in rad; exact (returned as it is) when already inside."""
+    """The same direction in [-pi, pi), rad. An angle already inside is returned unchanged."""
     if -math.pi <= angle < math.pi:
         return angle
     wrapped = math.remainder(angle, math.tau)

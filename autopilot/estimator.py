@@ -1,8 +1,8 @@
-"""What the law knows of the target: the truth, or the paper's extended Kalman filter (Section 2.2).
+"""The estimator of the target: the truth, or the paper's extended Kalman filter (Section 2.2).
 
 A sensor gives range and azimuth; the filter's state is X = (x, x', y, y') of Eq. (4), north and east of the flight's
 origin. Where the paper is silent: the filter starts from the first measurement, at `initial_velocity`; between two
-measurements the estimate moves at constant velocity. Where its print cannot be meant: Z_k observes X_k (Eq. (4) has
+measurements the estimate moves at constant velocity. Where its print must be a slip: Z_k observes X_k (Eq. (4) has
 Z_k+1), and arctan(y/x) is atan2(y, x).
 """
 
@@ -29,14 +29,14 @@ _CLOSEST = 1e-6  # m: nearer to the sensor than this a target has no azimuth
 
 
 class Measurement(NamedTuple):
-    """The target as the sensor sees it, Z of Eq. (4), or the difference of two such. m; rad, clockwise from north."""
+    """Range, m, and azimuth, rad, clockwise from north, of the target: Z of Eq. (4); also an innovation of these."""
 
     range: float
     azimuth: float
 
 
 class Estimate(NamedTuple):
-    """The target as the filter knows it at one moment, and the variance of each number. SI, north-east."""
+    """The target as estimated at one moment, and the variance of each number. SI, north-east."""
 
     target_north: float
     target_east: float
@@ -49,10 +49,10 @@ class Estimate(NamedTuple):
 
 
 class TargetFilter(Protocol):
-    """A filter in flight: `update` at every measurement, `at` in between."""
+    """The filter of one flight: `update` at every measurement, `at` in between."""
 
     def update(self, measured: Measurement) -> Measurement:
-        """Takes in the next measurement and returns its innovation: NaN when the filter started from it."""
+        """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
         ...
 
     def at(self, age: float) -> Estimate:
@@ -61,33 +61,35 @@ class TargetFilter(Protocol):
 
 
 class EstimatorKind(NamedTuple):
-    """A way to know the target."""
+    """The declaration of an estimator: how a law gets to know the target."""
 
-    about: str
+    about: str  # its source of knowledge, in a few words
     start: "Callable[[Estimator], TargetFilter] | None" = None  # before its first measurement; None: no filter
-    libraries: tuple[str, ...] = ()  # distributions that decide its estimates
+    libraries: tuple[str, ...] = ()  # the distributions whose version decides its estimates
 
 
 ESTIMATORS: Mapping[str, EstimatorKind] = MappingProxyType(
     {
         "truth": EstimatorKind("the target's own state"),
-        "ekf": EstimatorKind("as tracked by range and azimuth", lambda settings: ekf(settings), ("filterpy",)),
+        "ekf": EstimatorKind("estimated from range and azimuth", lambda settings: ekf(settings), ("filterpy",)),
     }
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimator:
-    """What the law knows of the target. Defaults are the paper's; its diag(0.5, 0.015) is in m^2 and rad^2."""
+    """The settings of the estimator. Defaults are the paper's; its diag(0.5, 0.015) is in m^2 and rad^2."""
 
     kind: Annotated[
         str, OneOf(tuple(ESTIMATORS)), About("; ".join(f"{name}: {kind.about}" for name, kind in ESTIMATORS.items()))
     ] = "truth"
     acceleration: Annotated[
-        Literal["known", "unknown"], About("the target's, to a law that is told the truth; an ekf knows of none")
+        Literal["known", "unknown"],
+        About("whether kind truth includes it, else the law gets 0; kind ekf always gives 0"),
     ] = "known"
     turn_rate: Annotated[
-        Literal["known", "unknown"], About("the target's, to a law that is told the truth; an ekf knows of none")
+        Literal["known", "unknown"],
+        About("whether kind truth includes it, else the law gets 0; kind ekf always gives 0"),
     ] = "known"
     period: Annotated[Seconds, Gt(0), Le(1e3), About("of the measurements, T_s")] = 0.5
     sensor_position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (0.0, 0.0)
@@ -108,7 +110,7 @@ class Estimator:
 
     @property
     def filters(self) -> bool:
-        """Whether the law knows the target through a sensor and a filter; False: it knows the truth."""
+        """Whether the law knows the target through a sensor and a filter, rather than the truth."""
         return ESTIMATORS[self.kind].start is not None
 
     def start(self) -> TargetFilter:
@@ -121,7 +123,7 @@ class Estimator:
 
 def ekf(settings: Estimator) -> "Tracker":
     """The paper's extended Kalman filter before its first measurement."""
-    from filterpy.kalman import ExtendedKalmanFilter  # takes half a second: who knows the truth does without
+    from filterpy.kalman import ExtendedKalmanFilter  # late: importing it takes half a second
 
     T_s, q, q_dot = settings.period, settings.process_position_variance, settings.process_velocity_variance
     kalman = ExtendedKalmanFilter(dim_x=4, dim_z=2)
@@ -132,7 +134,7 @@ def ekf(settings: Estimator) -> "Tracker":
 
 
 class Tracker:
-    """The extended Kalman filter in flight."""
+    """The extended Kalman filter of one flight."""
 
     def __init__(self, settings: Estimator, kalman: Any) -> None:
         self.kalman = kalman  # filterpy's, which has no types: x, P, y and mahalanobis are those of the latest update
@@ -141,7 +143,7 @@ class Tracker:
         self._P: list[list[float]] = []
 
     def update(self, measured: Measurement) -> Measurement:
-        """Takes in the next measurement and gives its innovation: NaN when the filter started from it."""
+        """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
         kalman, sensor, innovation = self.kalman, self._settings.sensor_position, Measurement(math.nan, math.nan)
         begins = not self._x
         if begins:
@@ -155,7 +157,7 @@ class Tracker:
         return innovation
 
     def at(self, age: float) -> Estimate:
-        """The estimate `age` s after the latest measurement: constant velocity, and a share of Q for the time gone."""
+        """The estimate `age` s after the latest measurement: constant velocity, and the share of Q for that time."""
         (x, x_dot, y, y_dot), P, s = self._x, self._P, self._settings
         share = age / s.period
         q, q_dot = share * s.process_position_variance, share * s.process_velocity_variance
@@ -172,7 +174,7 @@ class Tracker:
 
 
 def initial(s: Estimator, measured: Measurement) -> tuple[Array, Array]:
-    """X and its covariance at the first measurement: as set, or the measured position with the measurement's noise."""
+    """X, (4, 1), and its covariance at the first measurement: as set, or from the measured position and its noise."""
     if s.initial_position is None:
         r, cos, sin = measured.range, math.cos(measured.azimuth), math.sin(measured.azimuth)
         x, y = s.sensor_position[0] + r * cos, s.sensor_position[1] + r * sin
@@ -187,18 +189,18 @@ def initial(s: Estimator, measured: Measurement) -> tuple[Array, Array]:
 
 
 def measurement(x: float, y: float, x_s: float, y_s: float) -> Measurement:
-    """H_t without its noise: what a sensor at (x_s, y_s) sees of a target at (x, y)."""
+    """H_t without noise: range and azimuth of a target at (x, y) from a sensor at (x_s, y_s). m, rad."""
     return Measurement(math.hypot(x - x_s, y - y_s), math.atan2(y - y_s, x - x_s))
 
 
 def expected(X: Array, x_s: float, y_s: float) -> Array:
-    """H_t at the state X, a column; the sensor at (x_s, y_s)."""
+    """H_t at the state X, (4, 1), for a sensor at (x_s, y_s): a column, (2, 1)."""
     x, _, y, _ = X[:, 0].tolist()
     return np.array([measurement(x, y, x_s, y_s)]).T
 
 
 def linearised(X: Array, x_s: float, y_s: float) -> Array:
-    """The derivative of H_t by the state X."""
+    """The Jacobian of H_t at the state X, (2, 4)."""
     x, _, y, _ = X[:, 0].tolist()
     r = max(math.hypot(x - x_s, y - y_s), _CLOSEST)
     c, s = (x - x_s) / r, (y - y_s) / r
@@ -206,6 +208,6 @@ def linearised(X: Array, x_s: float, y_s: float) -> Array:
 
 
 def residual(z: Array, z_expected: Array) -> Array:
-    """The innovation z - z_expected, its azimuth wrapped: a target that crosses south has not gone round."""
+    """The innovation z - z_expected, (2, 1), with its azimuth wrapped: crossing south is not a full turn."""
     (r, alpha), (r_expected, alpha_expected) = z[:, 0].tolist(), z_expected[:, 0].tolist()
     return np.array([[r - r_expected], [wrap(alpha - alpha_expected)]])

@@ -1,4 +1,4 @@
-"""The wires of a guidance law: what it may know, what it answers."""
+"""The interface of a guidance law: its observation and its guidance."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple, Protocol
@@ -44,7 +44,7 @@ class Guidance(NamedTuple):
     range_error: float  # r = L - R_d
     sliding_variable: float  # s
     heading_error: float  # psi_a against its desired value, in [-pi, pi)
-    feed_forward: float  # the part of the command that neither s nor the manifold makes
+    feed_forward: float  # the part of the command that depends on neither s nor the manifold
     unlimited_command: float
 
 
@@ -52,7 +52,7 @@ LawStep = Callable[[Observation], Guidance]
 
 
 class Law(Protocol):
-    """A guidance law: a frozen value of parameters. What it remembers, if anything, lives in what `start` returns."""
+    """A guidance law: a frozen value of parameters. Any memory belongs to the function that `start` returns."""
 
     @property
     def standoff(self) -> float: ...
@@ -60,13 +60,13 @@ class Law(Protocol):
     def max_heading_rate(self) -> float: ...
     @property
     def command(self) -> Literal["heading_rate", "course_rate"]:
-        """The quantity that the limit limits."""
+        """The quantity to which the limit applies."""
         ...
 
     def start(self) -> LawStep:
-        """A fresh law in flight."""
+        """The law in flight, without memory of any other flight."""
         ...
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
-        """The conditions its own theory asks for and these gains break; `speed_ratio` is (v_t + v_w) / v_a."""
+        """Sentences on the conditions of its theory that the gains violate; `speed_ratio` is (v_t + v_w) / v_a."""
         ...

@@ -1,4 +1,4 @@
-"""The unit a number has at the border, declared once with the field it belongs to.
+"""Units and meanings of settings, declared once with the field that they belong to.
 
 Inside, every number is SI and radians. A field annotated `Degrees` holds radians; its key in a settings file is
 the field's name with the suffix `_deg`, and the file's number is multiplied by `Unit.si` on the way in.
@@ -19,14 +19,14 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What a field means, in one line: shown by `harness list` and in error messages."""
+    """The meaning of a field in one line, for `harness list` and the reference."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """The names that the field may have, where they are declared elsewhere."""
+    """The allowed values of a text field, where another module declares them."""
 
     names: tuple[str, ...]
 

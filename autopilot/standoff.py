@@ -15,8 +15,8 @@ from autopilot.angles import wrap
 from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
-_POINTS = 360  # on the circle, the first with the wind
-_CLOSEST = 1e-6  # m: nearer than this the azimuth has no meaning, and its rate is bounded by it
+_POINTS = 360  # on the circle
+_CLOSEST = 1e-6  # m: at a smaller distance the azimuth has no meaning; it also bounds the rate of the azimuth
 
 
 Motion = tuple[
@@ -47,7 +47,7 @@ def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Mot
         if a_t:
             across_dot += a_t * v_t_sin / (hypot(v_t_x, v_t_y) or 1.0)
         psi_a_d_dot = across_dot / sqrt(v_a * v_a - across * across)  # Eq. (20)
-    else:  # Remark 1 is broken: no heading keeps the distance; the nearest one is held
+    else:  # Remark 1 is violated: no heading keeps the distance; the nearest one is desired
         bar_psi_a_d = copysign(0.5 * pi, across)
         psi_a_d_dot = 0.0
     psi_a_err = bar_psi_a - bar_psi_a_d
@@ -67,13 +67,13 @@ def ground_speed(v_a: float, chi_a: float, W_x: float, W_y: float) -> float:
 
 
 def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> float:
-    """psi_a from the course: what a small UAV without air data knows. A crosswind beyond v_a counts as v_a."""
+    """psi_a, rad, from the course, for a UAV without air data. A crosswind above v_a counts as v_a."""
     across = (W_x * sin(chi_a) - W_y * cos(chi_a)) / v_a
     return wrap(chi_a + asin(max(-1.0, min(1.0, across))))
 
 
 def holding_course_rate(R_d: float, v_a: float, W_x: float, W_y: float, v_t_x: float, v_t_y: float) -> float:
-    """The largest course rate on the circle around a target of steady velocity, by Eq. (3), (5), (7) at each point."""
+    """The largest course rate, rad/s, on the circle around a target of steady velocity, by Eq. (3), (5), (7)."""
     w_x, w_y = W_x - v_t_x, W_y - v_t_y  # the air against the target
     along_wind, most = atan2(w_y, w_x), 0.0
     for i in range(_POINTS):
@@ -86,30 +86,30 @@ def holding_course_rate(R_d: float, v_a: float, W_x: float, W_y: float, v_t_x: f
     return most
 
 
-_guidance = Guidance._make  # builds it from a tuple, in half the time
+_guidance = Guidance._make  # from a tuple, in half the time of the constructor
 Reaching = Callable[[Motion], tuple[float, float, float]]  # feed-forward, rest of the command, s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StandoffLaw:
-    """What every standoff law has: the circle, the limit, and how the command is given."""
+    """The parameters that all standoff laws share: circle, limit, direction, and the quantities they compute with."""
 
     standoff: Annotated[Metres, Ge(0.1), About("desired distance to the target, R_d")] = 200.0
     max_heading_rate: Annotated[DegreesPerSecond, Gt(0), Unlimited(), About("limit of the command, Eq. (2)")] = radians(
         5.0
     )
     direction: Annotated[
-        Literal["paper", "mirrored"], About("way round: the paper's goes anticlockwise on a map, mirrored clockwise")
+        Literal["paper", "mirrored"], About("sense of circling: paper is anticlockwise on a map, mirrored is clockwise")
     ] = "paper"
     airspeed: Annotated[Literal["nominal", "measured"], About("the v_a that the law computes with")] = "nominal"
     command: Annotated[
         Literal["heading_rate", "course_rate"],
-        About("the quantity limited: heading rate, or course rate by Eq. (3) without air data"),
+        About("the quantity that is limited: heading rate, or course rate by Eq. (3), which needs no air data"),
     ] = "heading_rate"
 
 
 def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
-    """The law in flight: `reach` gives (feed-forward, rest of the command, s) for the paper's way round."""
+    """The law in flight. `reach` computes (feed-forward, rest of the command, s) for the paper's sense of circling."""
     R_d, max_rate = law.standoff, law.max_heading_rate
     measured, by_course = law.airspeed == "measured", law.command == "course_rate"
 

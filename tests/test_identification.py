@@ -9,7 +9,7 @@ import pytest
 
 import aircraft
 from harness.identification.fit import (
-    Fitted,
+    Training,
     airspeed_change,
     error,
     fit,
@@ -71,7 +71,7 @@ def test_a_fit_recovers_the_response_that_made_the_records() -> None:
 def test_a_fit_recovers_the_airspeed_hold() -> None:
     hold = AirspeedHold(gain=-0.7, frequency=0.6, damping=0.8)
     excess = np.repeat([0.0, 0.3, 0.0], 2000)
-    found = fit_airspeed([Fitted(excess, airspeed_change(hold, excess))])
+    found = fit_airspeed([Training(excess, airspeed_change(hold, excess))])
     assert astuple(found) == pytest.approx(astuple(hold), rel=1e-4)
 
 

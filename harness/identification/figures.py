@@ -1,4 +1,4 @@
-"""The step and the Bode plot of an identification: flown against fitted, as SVG."""
+"""Figures of an identification, as SVG: step responses and Bode plot, flown and fitted."""
 
 import math
 
@@ -10,51 +10,54 @@ from harness.identification.fit import followed
 from harness.identification.identify import Identification
 from harness.identification.manoeuvres import FASTEST, SLOWEST, STEP, held, lines
 
-_SHOWN = 3.0  # s, of the steps
+_CLOSE_UP = 3.0  # s, from the start of the steps
 _COLOURS = ("#9ecae1", "#6baed6", "#3182bd", "#08519c", "#08306b")
 _FITTED = "#c03030"
 
 
-def step_plot(found: Identification) -> str:
-    """The flown steps and the fitted one, relative to the command; the beginning and the whole."""
+def step_plot(identification: Identification) -> str:
+    """The flown step responses and the fitted one, relative to the command: the beginning and the whole."""
 
     def paint(figure: Figure) -> None:
-        for axes, shown in zip(
-            figure.subplots(1, 2, sharey=True), (_SHOWN, STEP * len(found.steps[0].rate)), strict=True
+        for axes, length in zip(
+            figure.subplots(1, 2, sharey=True), (_CLOSE_UP, STEP * len(identification.steps[0].rate)), strict=True
         ):
-            count = round(shown / STEP)
+            count = round(length / STEP)
             time = STEP * (np.arange(count) + 0.5)
-            for step, colour in zip(found.steps, _COLOURS, strict=True):
+            for step, colour in zip(identification.steps, _COLOURS, strict=True):
                 axes.plot(
                     time, step.rate[:count], color=colour, lw=1, label=f"flown, {math.degrees(step.amplitude):g} °/s"
                 )
-            fitted = followed(found.identified.heading_rate, held([1.0], shown)) / math.radians(1.0)
+            fitted = followed(identification.identified.heading_rate, held([1.0], length)) / math.radians(1.0)
             axes.plot(time, fitted, "--", color=_FITTED, lw=1.2, label="lagged")
-            axes.set(xlabel="time, s", xlim=(0.0, shown))
+            axes.set(xlabel="time, s", xlim=(0.0, length))
         figure.axes[0].set(ylabel="heading rate / command")
         figure.axes[1].legend(loc="lower right")
-        figure.suptitle(f"{found.airframe.name} at {found.identified.airspeed:g} m/s: steps of heading rate")
+        figure.suptitle(
+            f"{identification.airframe.name} at {identification.identified.airspeed:g} m/s: steps of heading rate"
+        )
 
     return draw(paint)
 
 
-def bode_plot(found: Identification) -> str:
-    """Gain and phase of the flown sweeps, and of the fitted response."""
+def bode_plot(identification: Identification) -> str:
+    """Gain and phase of the heading rate over its command: the flown sweeps and the fitted response."""
 
     def paint(figure: Figure) -> None:
         gain, phase = figure.subplots(2, 1, sharex=True)
-        for (name, sweep), colour in zip(found.sweeps.items(), _COLOURS[1::2] + _COLOURS[-1:], strict=False):
+        for (name, sweep), colour in zip(identification.sweeps.items(), _COLOURS[1::2] + _COLOURS[-1:], strict=False):
             label = f"flown, {math.degrees(sweep.rms):g} °/s rms ({name})"
             gain.loglog(lines(), np.abs(sweep.ratio), ".", color=colour, ms=4, label=label)
             phase.semilogx(lines(), np.degrees(np.unwrap(np.angle(sweep.ratio))), ".", color=colour, ms=4)
         omega = np.geomspace(SLOWEST, FASTEST, 400)
-        fitted = found.identified.heading_rate.at(omega)
+        fitted = identification.identified.heading_rate.at(omega)
         gain.loglog(omega, np.abs(fitted), color=_FITTED, lw=1, label="lagged")
         phase.semilogx(omega, np.degrees(np.unwrap(np.angle(fitted))), color=_FITTED, lw=1)
         gain.axhline(math.sqrt(0.5), color="0.6", lw=0.6)
         gain.set(ylabel="gain", ylim=(0.01, 2.0))
         phase.set(ylabel="phase, deg", xlabel="frequency, rad/s")
         gain.legend(loc="lower left")
-        figure.suptitle(f"{found.airframe.name} at {found.identified.airspeed:g} m/s: heading rate over its command")
+        at = f"{identification.airframe.name} at {identification.identified.airspeed:g} m/s"
+        figure.suptitle(f"{at}: heading rate over its command")
 
     return draw(paint, height=5.0)

@@ -1,4 +1,4 @@
-"""Least squares: the response that follows what was flown."""
+"""Fits linear responses to flown records by least squares."""
 
 import math
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from harness.plants.response import Response
 
 Array = NDArray[np.float64]
 
-_COMPARED = 4  # steps: what is fitted are means over 20 ms
+_COMPARED = 4  # steps: fits and errors compare means over 20 ms
 
 
-class Fitted(NamedTuple):
-    """What a response is to follow, a value per step: its input, and the output's mean over each step."""
+class Training(NamedTuple):
+    """A record to fit a response to: the input of each step, and the mean of the output over each step."""
 
     input: Array
     output: Array
@@ -35,8 +35,8 @@ _HIGHEST = (0.3, 60.0, 3.0, 0.5, 60.0, 3.0, 100.0, 5.0, 3.0, 0.9)
 _FIELDS = tuple(Response.__dataclass_fields__)
 
 
-def fit(records: Sequence[Fitted]) -> Response:
-    """The response that follows the records best, each weighing the same relative to its input."""
+def fit(records: Sequence[Training]) -> Response:
+    """The response that fits the records best; each record has the same weight, relative to its input."""
     weights = [1.0 / math.sqrt(np.sum(record.input**2) / _COMPARED) for record in records]
     longest = max(len(record.input) for record in records)
 
@@ -50,23 +50,23 @@ def fit(records: Sequence[Fitted]) -> Response:
         )
 
     start = np.array([getattr(_START, name) for name in _FIELDS])
-    found = least_squares(errors, start, bounds=(_LOWEST, _HIGHEST), x_scale=start, xtol=1e-7, ftol=1e-7)
-    return response_of(found.x)
+    solution = least_squares(errors, start, bounds=(_LOWEST, _HIGHEST), x_scale=start, xtol=1e-7, ftol=1e-7)
+    return response_of(solution.x)
 
 
 def response_of(x: Array) -> Response:
-    """The response with these numbers, in the order of its fields."""
+    """The response whose fields have these values, in their order."""
     return Response(**dict(zip(_FIELDS, (float(value) for value in x), strict=True)))
 
 
-def error(response: Response, record: Fitted) -> float:
-    """RMS of (model - flown), means over 20 ms, relative to the RMS of the input."""
+def error(response: Response, record: Training) -> float:
+    """The RMS of (response - flown), in means over 20 ms, relative to the RMS of the input."""
     wrong = means(followed(response, record.input) - record.output)
     return float(np.sqrt(np.mean(wrong**2) / np.mean(record.input**2)))
 
 
 def followed(response: Response, command: Array) -> Array:
-    """What the response makes of a command, a value per step: its mean over each step."""
+    """The output of the response to a command: its mean over each step, one value per step of the command."""
     return _convolved(command, pulse_response(response, len(command)))
 
 
@@ -76,21 +76,21 @@ def pulse_response(response: Response, count: int) -> Array:
     n = len(b)
     system = np.zeros((n + 2, n + 2))
     system[:n, :n], system[:n, -1], system[n, :n] = A, b, c
-    whole = int(response.delay // STEP)
-    late = response.delay - whole * STEP  # into a step: the pulse then ends as late in the next
+    steps = int(response.delay // STEP)  # whole ones in the delay
+    late = response.delay - steps * STEP  # the pulse begins that late in a step, and ends as late in the next
     before, after = expm(system * late), expm(system * (STEP - late))
     step = (after @ before)[: n + 1, : n + 1]
     begun, ended = after[: n + 1, -1], after[: n + 1, : n + 1] @ before[: n + 1, -1]
     second = step[:, :n] @ begun[:n] + ended
     states, power = second[:n, np.newaxis], step[:n, :n]
-    while states.shape[1] < count:  # doubling
+    while states.shape[1] < count:  # each pass doubles the number of steps
         states, power = np.hstack([states, power @ states]), power @ power
-    means = np.concatenate([np.zeros(whole), [begun[n], second[n]], step[n, :n] @ states]) / STEP
+    means = np.concatenate([np.zeros(steps), [begun[n], second[n]], step[n, :n] @ states]) / STEP
     return means[:count]
 
 
-def fit_airspeed(records: Sequence[Fitted]) -> AirspeedHold:
-    """The hold that follows the records (load factor beyond one; change of airspeed), each weighing the same."""
+def fit_airspeed(records: Sequence[Training]) -> AirspeedHold:
+    """The airspeed hold that fits the records best, from load factor beyond one to change of airspeed, m/s."""
     weights = [1.0 / max(float(np.sqrt(np.sum(record.input**2))), 1e-12) for record in records]
 
     def errors(x: Array) -> Array:
@@ -102,17 +102,17 @@ def fit_airspeed(records: Sequence[Fitted]) -> AirspeedHold:
             ]
         )
 
-    found = least_squares(errors, [-0.5, 0.8, 1.0], bounds=([-20, 0.05, 0.05], [20, 10, 10]), xtol=1e-7)
-    return AirspeedHold(gain=float(found.x[0]), frequency=float(found.x[1]), damping=float(found.x[2]))
+    solution = least_squares(errors, [-0.5, 0.8, 1.0], bounds=([-20, 0.05, 0.05], [20, 10, 10]), xtol=1e-7)
+    return AirspeedHold(gain=float(solution.x[0]), frequency=float(solution.x[1]), damping=float(solution.x[2]))
 
 
 def airspeed_change(hold: AirspeedHold, excess: Array) -> Array:
-    """What the load factor beyond one, held over each step, does to the airspeed at the steps' ends. m/s."""
+    """The change of airspeed, m/s, at the end of each step; `excess` is each step's load factor beyond one."""
     F = np.array([[-2 * hold.damping * hold.frequency, -(hold.frequency**2), hold.gain], [1, 0, 0], [0, 0, 0]])
     step = expm(F * STEP)
     (a, b), (c, d) = step[:2, :2]
     g, k = step[:2, 2]
-    # v over e, of z v = a v + b i + g e, z i = c v + d i + k e
+    # v over e, from z v = a v + b i + g e, z i = c v + d i + k e
     return np.asarray(lfilter([0.0, g, b * k - d * g], [1.0, -(a + d), a * d - b * c], np.append(excess, 0.0))[1:])
 
 
@@ -121,6 +121,6 @@ def _convolved(command: Array, kernel: Array) -> Array:
 
 
 def means(values: Array) -> Array:
-    """Of four steps each, 20 ms."""
-    whole = len(values) // _COMPARED * _COMPARED
-    return np.asarray(values[:whole].reshape(-1, _COMPARED).mean(axis=1))
+    """Means over four steps each, 20 ms; steps left at the end are dropped."""
+    complete = len(values) // _COMPARED * _COMPARED
+    return np.asarray(values[:complete].reshape(-1, _COMPARED).mean(axis=1))

@@ -1,4 +1,4 @@
-"""The identification of an airframe: manoeuvres flown on 6-DOF, responses fitted, and both compared."""
+"""Identifies an airframe's inner loop: flies manoeuvres on the plant sixdof, fits responses, and validates them."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.identification import manoeuvres
-from harness.identification.fit import Array, Fitted, airspeed_change, fit, fit_airspeed, means
+from harness.identification.fit import Array, Training, airspeed_change, fit, fit_airspeed, means
 from harness.identification.manoeuvres import (
     CHATTER,
     HELD_OUT,
@@ -33,17 +33,17 @@ from harness.series import rms
 from harness.world.air import Air
 
 _BANK = State._fields.index("bank")
-_SHOWN = 10.0  # s, of the steps
+_STEP_LENGTH = 10.0  # s, of each step
 _AIRSPEED_STEPS_DEG_S = (5.0, 10.0, 20.0)
 
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """A flown step of heading-rate command, relative to it."""
+    """A flown step response of the heading rate, relative to its command."""
 
     amplitude: float  # rad/s
-    rate: Array  # a value per simulation step
-    lag: float  # s to 63 %
+    rate: Array  # heading rate over the step of its command, a value per simulation step
+    lag: float  # time to 63 %, s
     overshoot: float
     gain: float  # mean of the last 2 s
     turn_ratio: float  # heading rate over g tan(bank) / V, over the same 2 s
@@ -52,14 +52,14 @@ class StepResponse:
 
 @dataclass(frozen=True, slots=True)
 class FrequencyResponse:
-    """A flown sweep: flown over commanded at each of `manoeuvres.lines()`."""
+    """A flown sweep: heading rate over its command at each frequency of `manoeuvres.lines()`."""
 
     rms: float  # rad/s, of the command
     ratio: NDArray[np.complex128]
 
     @property
     def bandwidth(self) -> float:
-        """Where the gain first falls through -3 dB, rad/s; NaN when it does not."""
+        """The frequency at which the gain first falls below -3 dB, rad/s; NaN if it never does."""
         gain, omega = np.abs(self.ratio), np.log(manoeuvres.lines())
         below = np.flatnonzero((gain[1:] < math.sqrt(0.5)) & (gain[:-1] >= math.sqrt(0.5)))
         if not below.size:
@@ -68,7 +68,7 @@ class FrequencyResponse:
         return math.exp(float(np.interp(-math.sqrt(0.5), -gain[i : i + 2], omega[i : i + 2])))
 
     def at(self, omega: float) -> tuple[float, float]:
-        """Gain, and phase in rad, interpolated between the lines."""
+        """Gain and phase, rad, at the frequency `omega`, rad/s, interpolated between the lines."""
         lines = np.log(manoeuvres.lines())
         phase = np.unwrap(np.angle(self.ratio))
         return float(np.interp(math.log(omega), lines, np.abs(self.ratio))), float(
@@ -78,20 +78,23 @@ class FrequencyResponse:
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """Everything that `harness identify` tells and draws."""
+    """All results of `harness identify`."""
 
     airframe: Path
     identified: Identified
     steps: tuple[StepResponse, ...]
     sweeps: Mapping[str, FrequencyResponse]
-    airspeed_error: tuple[float, float]  # m/s RMS: of the hold's model in the largest step, and of no model at all
+    airspeed_error: tuple[float, float]  # RMS, m/s, in the largest step: of the fitted hold, and of constant airspeed
 
 
 FLIGHTS = 2 * len(TRAINING) + len(HELD_OUT) + len(CHATTER) + len(STEPS_DEG_S) + len(SWEPT) + len(_AIRSPEED_STEPS_DEG_S)
 
 
 def identify(airframe: Path, airspeed: float, done: Callable[[], None] = lambda: None) -> Identification:
-    """Flies, fits and compares; `done` is called after each of `FLIGHTS`. Raises `PlantError` or `End` of a flight."""
+    """Flies, fits and validates at this airspeed, m/s; `done` is called after each of `FLIGHTS` flights.
+
+    Raises `PlantError` when a manoeuvre cannot start, `End` when one ends early.
+    """
 
     def fly(command: Array, rate_trim: bool = True) -> Record:
         record = flown(airframe, airspeed, command, rate_trim)
@@ -99,56 +102,58 @@ def identify(airframe: Path, airspeed: float, done: Callable[[], None] = lambda:
         return record
 
     limit = aircraft.limits(airframe).bank
-    steps = tuple(step_response(fly(held([rate], _SHOWN))) for rate in STEPS_DEG_S)
+    steps = tuple(step_response(fly(held([rate], _STEP_LENGTH))) for rate in STEPS_DEG_S)
     sweeps = {name: frequency_response(fly(sweep(rms, periods=2))) for name, rms in SWEPT.items()}
     heading_rate = fit([of_heading_rate(fly(command)) for command in TRAINING.values()])
     bank = fit([of_bank(fly(command, rate_trim=False), limit) for command in TRAINING.values()])
-    entries = [of_airspeed(fly(held([rate, 0.0], _SHOWN))) for rate in _AIRSPEED_STEPS_DEG_S]
-    found = Identified(
+    entries = [of_airspeed(fly(held([rate, 0.0], _STEP_LENGTH))) for rate in _AIRSPEED_STEPS_DEG_S]
+    fitted = Identified(
         airspeed=airspeed, heading_rate=heading_rate, bank=bank, hold=fit_airspeed(entries), bank_limit=limit,
         measured={}, errors={},
     )  # fmt: skip
-    errors = {name: _errors(found, fly(command)) for name, command in {**HELD_OUT, **CHATTER}.items()}
+    errors = {name: _errors(fitted, fly(command)) for name, command in {**HELD_OUT, **CHATTER}.items()}
     five = steps[STEPS_DEG_S.index(5.0)]
     measured = {
         "gain": five.gain, "lag_s": five.lag, "overshoot": five.overshoot, "turn_ratio": five.turn_ratio,
         "bandwidth_rad_s": sweeps["medium"].bandwidth,
     }  # fmt: skip
-    change = airspeed_change(found.hold, entries[-1].input)
+    change = airspeed_change(fitted.hold, entries[-1].input)
     return Identification(
         airframe=airframe,
-        identified=replace(found, measured=measured, errors=errors),
+        identified=replace(fitted, measured=measured, errors=errors),
         steps=steps,
         sweeps=sweeps,
         airspeed_error=(rms(change - entries[-1].output), rms(entries[-1].output)),
     )
 
 
-def of_heading_rate(record: Record) -> Fitted:
-    """Heading rate from its command."""
-    return Fitted(record.command, record.heading_rate)
+def of_heading_rate(record: Record) -> Training:
+    """The record for a fit of the heading rate from its command."""
+    return Training(record.command, record.heading_rate)
 
 
-def of_bank(record: Record, limit: float) -> Fitted:
-    """Bank from its command, as the inner loop makes it of the heading rate's."""
+def of_bank(record: Record, limit: float) -> Training:
+    """The record for a fit of the bank from the bank command that the inner loop computes; `limit` in rad."""
     commanded = np.array([bank_command(rate, record.airspeed, limit) for rate in record.command.tolist()])
     bank = record.states[:, _BANK]
-    return Fitted(commanded, 0.5 * (bank[1:] + bank[:-1]))
+    return Training(commanded, 0.5 * (bank[1:] + bank[:-1]))
 
 
-def of_airspeed(record: Record) -> Fitted:
-    """Change of airspeed from the load factor beyond one."""
-    return Fitted(1.0 / np.cos(record.states[:-1, _BANK]) - 1.0, record["airspeed"] - record.airspeed)
+def of_airspeed(record: Record) -> Training:
+    """The record for a fit of the change of airspeed from the load factor beyond one."""
+    return Training(1.0 / np.cos(record.states[:-1, _BANK]) - 1.0, record["airspeed"] - record.airspeed)
 
 
 def step_response(record: Record) -> StepResponse:
-    """A step's figures."""
+    """Lag, overshoot, gain, turn ratio and bank of a flown step."""
     amplitude = float(record.command[0])
     share = record.heading_rate / amplitude
     reached = 1.0 - math.exp(-1.0)
     after = int(np.argmax(share >= reached))
     before = max(after - 1, 0)
-    lag = STEP * (0.5 + float(np.interp(reached, share[[before, after]], [before, after])))  # a mean is of mid-step
+    lag = STEP * (
+        0.5 + float(np.interp(reached, share[[before, after]], [before, after]))
+    )  # a mean over a step belongs to its middle
     last = slice(-round(2.0 / STEP), None)
     coordinated = rate_of_turn(record["airspeed"], record["bank"])
     gain = float(share[last].mean())
@@ -164,16 +169,16 @@ def step_response(record: Record) -> StepResponse:
 
 
 def frequency_response(record: Record) -> FrequencyResponse:
-    """The second period of a sweep, where the first has died away."""
+    """The frequency response from the second period of a sweep, when the transient of the first has died away."""
     count = round(SWEEP_PERIOD / STEP)
     multiples = np.round(manoeuvres.lines() / manoeuvres.SLOWEST).astype(int)
     command, rate = (np.fft.rfft(values[-count:])[multiples] for values in (record.command, record.heading_rate))
     return FrequencyResponse(rms(record.command), rate / command)
 
 
-def _errors(found: Identified, record: Record) -> tuple[float, float]:
-    """Of the plants lagged and coordinated: heading rate less the flown, RMS of means over 20 ms over the command's."""
-    lagged, coordinated = (_followed(plant, record) for plant in (found.lagged, found.coordinated))
+def _errors(fitted: Identified, record: Record) -> tuple[float, float]:
+    """The errors of the plants lagged and coordinated in heading rate: RMS of means over 20 ms over the command's."""
+    lagged, coordinated = (_followed(plant, record) for plant in (fitted.lagged, fitted.coordinated))
     scale = rms(record.command)
     return (
         rms(means(lagged - record.heading_rate)) / scale,
@@ -182,7 +187,7 @@ def _errors(found: Identified, record: Record) -> tuple[float, float]:
 
 
 def _followed(plant: Plant, record: Record) -> Array:
-    """What the plant makes of the record's command: the mean heading rate over each step."""
+    """The mean heading rate of the plant over each step, rad/s, for the command of the record."""
     flying = plant.start(Start(airspeed=record.airspeed, heading=0.0), Air())
     headings = [0.0]
     for rate in record.command.tolist():

@@ -1,4 +1,4 @@
-"""The commands that an airframe is identified with, and what it did."""
+"""The manoeuvres that identify an airframe: their commands, and the records of flying them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,17 +25,17 @@ STEPS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0)
 
 
 def held(levels_deg_s: Sequence[float], each: float) -> Array:
-    """Each level held for `each` seconds; rad/s, a value per step."""
+    """A command, rad/s, one value per step: each level, deg/s, held for `each` seconds."""
     return np.repeat(np.radians(levels_deg_s), round(each / STEP))
 
 
 def lines() -> Array:
-    """The frequencies of the sweep: whole multiples of the slowest, evenly spread over the decades. rad/s."""
+    """The frequencies of the sweep, rad/s: whole multiples of the slowest, evenly spread on a logarithmic scale."""
     return SLOWEST * np.unique(np.round(np.geomspace(1.0, FASTEST / SLOWEST, 50)))
 
 
 def sweep(rms_deg_s: float, periods: int = 1) -> Array:
-    """All frequencies of `lines()` at once, equally strong, with phases by chance. rad/s, a value per step."""
+    """A command, rad/s, one value per step: all frequencies of `lines()`, of equal amplitude and random phase."""
     time = STEP * np.arange(round(SWEEP_PERIOD / STEP))
     omega = lines() * SWEEP_PERIOD / (STEP * len(time))  # the period is a whole number of steps
     phases = stream(0, "sweep").uniform(0.0, 2.0 * math.pi, len(omega))
@@ -72,24 +72,24 @@ CHATTER: Mapping[str, Array] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A command and what the airframe did with it. `states` has a row per step, the first one before it."""
+    """A command and the states of the airframe that followed it. SI, rad."""
 
     command: Array  # rad/s, a value per step
-    states: Array
+    states: Array  # (steps + 1, fields of State); the first row precedes the first step
     airspeed: float  # nominal
 
     def __getitem__(self, field: str) -> Array:
-        """A field of the state at the end of each step."""
+        """A field of the state, by name, at the end of each step."""
         return self.states[1:, State._fields.index(field)]
 
     @property
     def heading_rate(self) -> Array:
-        """The mean over each step."""
+        """The mean heading rate over each step, rad/s."""
         return np.diff(np.unwrap(self.states[:, State._fields.index("heading")])) / STEP
 
 
 def flown(airframe: Path, airspeed: float, command: Array, rate_trim: bool = True) -> Record:
-    """The command flown from trim on the 6-DOF airframe. Raises `PlantError` or `End` when it cannot."""
+    """Flies a command, rad/s per step, on the plant sixdof, from trim in still air. Raises `PlantError`, `End`."""
     flying = SixDof(airframe, STEP, rate_trim).start(Start(airspeed=airspeed, heading=0.0), Air())
     states = [flying.state]
     for rate in command.tolist():

@@ -1,1 +1,1 @@
-"""The limit cycle of a law behind an inner loop: predicted, and observed in flight."""
+"""The limit cycle of a guidance law behind an inner loop: predicted, and observed in flight."""

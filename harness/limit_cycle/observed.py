@@ -1,4 +1,4 @@
-"""A limit cycle observed in flight: the loop flown beside its circle, and what is left measured."""
+"""A limit cycle observed in flight: the loop is flown from near its circle, and its steady oscillation measured."""
 
 import math
 
@@ -14,11 +14,11 @@ from harness.world.target import Target
 
 Array = NDArray[np.float64]
 
-_DURATION, _SETTLED = 120.0, 60.0  # s
+_DURATION, _SETTLED = 120.0, 60.0  # s: of the flight, and of its transient
 
 
 def fly(loop: Loop, plant: Plant, duration: float = _DURATION) -> LimitCycle:
-    """The loop flown from a metre beside its circle: what is left after `_SETTLED` seconds, or half the flight."""
+    """The limit cycle of the loop on `plant`, started 1 m outside its circle; the first 60 s, at most half, are cut."""
     R_d, period = loop.law.standoff, loop.period
     flight = Flight(
         plant=BASELINE,  # `plant` flies in its place
@@ -35,7 +35,10 @@ def fly(loop: Loop, plant: Plant, duration: float = _DURATION) -> LimitCycle:
 
 
 def measured(rate: Array, error: Array, commanded: Array, period: float) -> LimitCycle:
-    """The cycle in records of a steady state: its frequency from the spectrum's peak, amplitudes cycle by cycle."""
+    """The limit cycle in records of a steady state, SI, rad, one value per `period` seconds.
+
+    The frequency is that of the peak of the spectrum; amplitudes are means over the cycles.
+    """
     finer = 16 * len(rate)
     spectrum = np.abs(np.fft.rfft((rate - rate.mean()) * np.hanning(len(rate)), finer))
     frequency = float(np.argmax(spectrum)) / (finer * period)

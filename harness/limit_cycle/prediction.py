@@ -1,4 +1,4 @@
-"""The limit cycle that a high-gain law falls into behind a lagging inner loop, predicted from the identified response.
+"""Predicts the limit cycle of a high-gain law behind an inner loop with lag, from the identified response.
 
 On its circle the aircraft turns at omega_0 = -v_a / R_d. The command u, held for a period T, makes the heading error e
 and the range error r, and the law makes the command of them:
@@ -7,8 +7,8 @@ and the range error r, and the law makes the command of them:
 
 where H and J are the identified response's first and second integral at the sampling instants. A steady oscillation
 e = sum of E_m exp(i m omega t) has E_m = H(exp(i m omega T)) U_m for every harmonic m of u, and U_0 = omega_0: the turn
-biases the law, and a mean range error makes up for it. With one harmonic this is the biased describing function; with
-more it tends to the cycle of the sampled loop itself. The law is called as in flight: no gain of it is approximated.
+biases the law, and a mean range error compensates the bias. With one harmonic this is the biased describing function;
+with more it converges to the cycle of the sampled loop. The law is called as in flight: no gain of it is approximated.
 """
 
 import math
@@ -27,17 +27,17 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HARMONICS = 15
-VISIBLE = math.radians(0.5)  # rad/s: a command that swings by less is not called a limit cycle
-_SAMPLES = 128  # of the cycle
+VISIBLE = math.radians(0.5)  # rad/s: an oscillation of the command with a smaller amplitude is not a limit cycle
+_SAMPLES = 128  # in one cycle
 _SOLVED = 1e-6  # the largest imbalance of a solution, relative to the first harmonic
-_UNKNOWN = (math.nan, math.nan, math.nan)  # heading rate, bank and roll rate, which no law here asks for
+_UNKNOWN = (math.nan, math.nan, math.nan)  # heading rate, bank, roll rate: unknown here
 
 
 class LimitCycle(NamedTuple):
     """A limit cycle on the circle. SI, rad; an amplitude is half of peak to peak."""
 
     frequency: float  # Hz
-    heading_rate: float  # amplitude of its means over a period
+    heading_rate: float  # amplitude of the means over a guidance period
     command: float  # amplitude
     range_mean: float
     range_error: float  # amplitude
@@ -50,15 +50,15 @@ class Loop:
     law: Law
     response: Response  # of the heading rate to its command
     airspeed: float
-    period: float  # s, for which a command is held
+    period: float  # s, between two commands
 
     @property
     def turn(self) -> float:
-        """The heading rate of the circle in still air, the paper's way round. rad/s."""
+        """The heading rate on the circle in still air, in the paper's direction, rad/s."""
         return -self.airspeed / self.law.standoff
 
     def commands(self, e: Array, r: Array) -> Array:
-        """The law's commands at these heading and range errors."""
+        """The commands of the law, rad/s, at these heading errors, rad, and range errors, m; equal shapes."""
         law: Any = self.law
         step = (replace(law, direction="paper") if hasattr(law, "direction") else law).start()
         R_d, v_a = self.law.standoff, self.airspeed
@@ -72,18 +72,18 @@ class Loop:
 
 
 class _Cycle(NamedTuple):
-    """An oscillation that may balance or not, over one turn of its phase."""
+    """One cycle of an assumed oscillation, and by how much the loop fails to sustain it."""
 
     omega: float
     e: Array
     r: Array
     u: Array
     U: Complex  # harmonics of u from 0 on
-    imbalance: Array  # relative
+    imbalance: Array  # relative; zero for a limit cycle
 
 
 def _cycle(loop: Loop, x: Array) -> _Cycle:
-    """The oscillation x: logarithms of omega and E_1, mean r over v_a, then real and imaginary parts of E_m / E_1."""
+    """The oscillation with the unknowns x: ln omega, ln E_1, mean r / v_a, then Re and Im of E_m / E_1 for m >= 2."""
     higher = (len(x) - 3) // 2
     m = np.arange(1, higher + 2)
     omega = float(np.exp(x[0]))
@@ -100,9 +100,9 @@ def _cycle(loop: Loop, x: Array) -> _Cycle:
 
 
 def limit_cycle(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
-    """The predicted limit cycle; None when there is none by which the command swings by `VISIBLE` or more.
+    """The predicted limit cycle; None if there is none with a command amplitude of `VISIBLE` or more.
 
-    ValueError when the limit is below the heading rate of the circle, which then is not flown.
+    Raises ValueError when the heading-rate limit is below the heading rate of the circle.
     """
     if loop.law.max_heading_rate <= abs(loop.turn):
         raise ValueError("the circle cannot be held: the heading-rate limit is below what it takes")
@@ -114,36 +114,36 @@ def limit_cycle(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
         for amplitude in (0.5 * limit / gain, 0.05 * limit / gain):
             x = _balanced(loop, np.array([math.log(slower * omega), math.log(amplitude), 0.0]), harmonics)
             if x is not None:
-                return _told(loop, _cycle(loop, x))
+                return _limit_cycle(loop, _cycle(loop, x))
     return None
 
 
 def _balanced(loop: Loop, guess: Array, harmonics: int) -> Array | None:
-    """The oscillation that balances, first with one harmonic; None when none is found from this guess."""
+    """The unknowns of the limit cycle, solved with more and more harmonics; None if the guess leads to no solution."""
     for count in sorted({1, min(3, harmonics), min(7, harmonics), harmonics}):
-        found = _solved(lambda x: _cycle(loop, x).imbalance, _with_harmonics(guess, count))
-        if found is None:
+        solution = _solved(lambda x: _cycle(loop, x).imbalance, _with_harmonics(guess, count))
+        if solution is None:
             return None
-        guess = found
-        if np.ptp(_cycle(loop, found).u) < VISIBLE:
+        guess = solution
+        if np.ptp(_cycle(loop, solution).u) < VISIBLE:
             break
     return guess
 
 
 def _solved(imbalance: Callable[[Array], Array], x: Array) -> Array | None:
     scale = np.append([1.0, 1.0], np.full(len(x) - 2, 0.1))
-    found = least_squares(imbalance, x, x_scale=scale, xtol=1e-10, max_nfev=40)
-    return np.asarray(found.x) if np.abs(found.fun).max() < _SOLVED else None
+    solution = least_squares(imbalance, x, x_scale=scale, xtol=1e-10, max_nfev=40)
+    return np.asarray(solution.x) if np.abs(solution.fun).max() < _SOLVED else None
 
 
 def _with_harmonics(x: Array, count: int) -> Array:
-    """The same oscillation with so many harmonics, the new ones zero."""
+    """The same oscillation with `count` harmonics, the added ones zero."""
     known = (len(x) - 3) // 2
     new = np.zeros(count - 1 - known)
     return np.concatenate([x[:3], x[3 : 3 + known], new, x[3 + known :], new])
 
 
-def _told(loop: Loop, cycle: _Cycle) -> LimitCycle | None:
+def _limit_cycle(loop: Loop, cycle: _Cycle) -> LimitCycle | None:
     command = float(np.ptp(cycle.u)) / 2.0
     if command < VISIBLE:
         return None
@@ -159,7 +159,7 @@ def _told(loop: Loop, cycle: _Cycle) -> LimitCycle | None:
 
 
 def critical_gain(response: Response, period: float) -> tuple[float, float]:
-    """The smallest gain, 1/s, from heading error to command at which the held loop oscillates, its rad/s; or inf."""
+    """Smallest gain, 1/s, from heading error to command that makes the sampled loop oscillate, its rad/s; or inf."""
     omega = math.pi / period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
     H = response.sampled(period, np.exp(1j * omega * period))[:, 0]
     crossing = np.flatnonzero((np.sign(H.imag[1:]) != np.sign(H.imag[:-1])) & (H.real[1:] < 0.0))
@@ -170,7 +170,7 @@ def critical_gain(response: Response, period: float) -> tuple[float, float]:
 
 
 def boundary(loop_at: Callable[[float], Loop], guess: float) -> float:
-    """The q > 0 at which the limit cycle of `loop_at(q)` makes the command swing by just `VISIBLE`; else NaN."""
+    """The q > 0, near `guess`, at which the limit cycle of `loop_at(q)` has the command amplitude `VISIBLE`; or NaN."""
 
     def imbalance(x: Array) -> Array:
         cycle = _cycle(loop_at(float(np.exp(x[3]))), x[:3])

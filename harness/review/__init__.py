@@ -1,1 +1,1 @@
-"""Looking at flights in Rerun: recordings written and read, the viewer, and flights shown while they are flown."""
+"""Review of flights in Rerun: writing and reading recordings, the viewer, and streaming a flight while it is flown."""

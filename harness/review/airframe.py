@@ -1,4 +1,4 @@
-"""The shape that an aircraft is drawn with, from its own span and chord. Body axes, m."""
+"""The shape of an aircraft in the scene, drawn with its own span and chord. Body axes, m."""
 
 import numpy as np
 import rerun as rr
@@ -16,7 +16,7 @@ _WHITE = (255, 255, 255)
 
 
 def size(flight: Flight) -> tuple[float, float, bool]:
-    """Span and mean chord, m; whether there is a tail. A small aircraft's where the airframe's files do not say."""
+    """Span, m, mean chord, m, and whether there is a tail; those of a small aircraft where the files do not say."""
     try:
         data = aircraft.data(aircraft.folder(flight.aircraft))
         return float(data["ref"]["b"]["v"]), float(data["ref"]["c"]["v"]), bool(data["meta"]["has_rudder"])
@@ -25,7 +25,7 @@ def size(flight: Flight) -> tuple[float, float, bool]:
 
 
 def airframe(flight: Flight, times: float, colour: Colour) -> rr.Mesh3D:
-    """Wing of the airframe's span and chord; body, and tail where it has a rudder, are a sketch. Body axes."""
+    """A mesh with the airframe's span and chord, enlarged `times`; the body and the tail are only sketched."""
     b, c, tail = size(flight)
     length = 0.75 * b if tail else 1.6 * c
     nose = 0.35 * length if tail else 0.9 * c

@@ -1,4 +1,4 @@
-"""What several flights differ by: each against the reference, at the same time, in quantities relative to the path."""
+"""Plots of differences: each flight minus the reference at the same time, in quantities relative to the path."""
 
 from collections.abc import Sequence
 
@@ -17,26 +17,26 @@ _DIFFERENCES = (
 
 
 def difference_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
-    """Flight minus reference for as long as both fly; none of a flight alone.
+    """Plots of flight minus reference, for as long as both last; empty for a single flight.
 
-    A reference without bank and sideslip turns as the paper assumes: banked by atan(V heading_rate / g), no sideslip.
+    A reference without bank and sideslip is taken as coordinated: bank atan(V heading_rate / g), sideslip 0.
     """
     plots = []
     for column, title, unit, scale in _DIFFERENCES if len(flights) > 1 else ():
-        series = [kept for one in flights[1:] if (kept := finite(_difference(column, scale, one, flights[0])))]
+        series = [drawn for flight in flights[1:] if (drawn := finite(_difference(column, scale, flight, flights[0])))]
         if series:
             assumed = ", taken as coordinated" if np.isnan(flights[0].log[column]).all() else ""
-            drawn = [level("0", (0.0,), end(flights)), *series]
+            lines = [level("0", (0.0,), end(flights)), *series]
             name = f"Δ {title.lower()} [{unit}] to the reference{assumed}"
-            plots.append(Plot(f"difference_{column}", name, drawn, span(drawn)))
+            plots.append(Plot(f"difference_{column}", name, lines, span(lines)))
     return plots
 
 
-def _difference(column: str, scale: float, one: StyledFlight, reference: StyledFlight) -> Series:
-    both = one.log["time"][one.log["time"] <= reference.log["time"][-1]] if len(reference.log) else np.empty(0)
+def _difference(column: str, scale: float, flight: StyledFlight, reference: StyledFlight) -> Series:
+    both = flight.log["time"][flight.log["time"] <= reference.log["time"][-1]] if len(reference.log) else np.empty(0)
     expected = np.interp(both, reference.log["time"], _expected(column, reference)) if len(both) else both
-    values = scale * (one.log[column][: len(both)] - expected)
-    return Series((one.name,), (one.colour,), (one.width,), both, values[:, np.newaxis])
+    values = scale * (flight.log[column][: len(both)] - expected)
+    return Series((flight.name,), (flight.colour,), (flight.width,), both, values[:, np.newaxis])
 
 
 def _expected(column: str, reference: StyledFlight) -> Array:

@@ -1,4 +1,4 @@
-"""Lanes of states over a flight, and its events: what a reader would otherwise have to find in the curves."""
+"""Lanes, which show states over time such as "at the limit", and the events of a flight."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,9 +14,9 @@ from harness.metric import Signals
 from harness.plants.plant import Outcome
 from harness.review.styled import Colour
 
-WINDOW = 1.0  # s: a lane tells of windows this long, so that a command that chatters can be read
-MOST_EVENTS = 15  # of one lane; a lane that changes more often is told as one event
-GUSTS = (0.25, 0.1)  # of the nominal airspeed
+WINDOW = 1.0  # s: a lane has one state per window, so that a chattering command stays readable
+MOST_EVENTS = 15  # of one lane; a lane with more changes becomes one event
+GUSTS = (0.25, 0.1)  # thresholds, relative to the nominal airspeed
 
 _GREEN, _BLUE, _AMBER, _RED, _SLATE = (70, 150, 80), (60, 115, 175), (200, 130, 40), (200, 60, 60), (85, 90, 100)
 COLOURS: Mapping[str, Colour] = MappingProxyType(
@@ -52,7 +52,7 @@ class Change(NamedTuple):
 
 
 class Event(NamedTuple):
-    """Something that happened; `level` as Rerun's text log has them."""
+    """An event at `time`, s; `level` is one of Rerun's text log levels."""
 
     time: float
     level: str
@@ -60,21 +60,21 @@ class Event(NamedTuple):
 
 
 def lanes(log: FlightLog) -> dict[str, list[Change]]:
-    """The lanes of a flight by name. A lane that would say nothing is left out."""
+    """The lanes of a flight by name, without those that would be empty."""
     if not len(log):
         return {}
-    made = {
+    changes_by_lane = {
         "circle": _circle(log),
         "command": command_lane(log),
         "aircraft": _aircraft(log),
         "air": _air(log),
         "target": _target(log),
     }
-    return {name: [*changes, *_ending(log)] for name, changes in made.items() if changes}
+    return {name: [*changes, *_ending(log)] for name, changes in changes_by_lane.items() if changes}
 
 
 def summary(log: FlightLog) -> list[Change]:
-    """One lane for the whole flight: converged or not; before that whether the command is at its limit."""
+    """One lane that sums up the flight: converged or not and, until then, whether the command is at its limit."""
     if not len(log):
         return []
     limits, circle = command_lane(log), _circle(log)
@@ -84,26 +84,29 @@ def summary(log: FlightLog) -> list[Change]:
     return [*_merged([*before, *settled]), *_ending(log)]
 
 
-def events(log: FlightLog, told: Mapping[str, Sequence[Change]], others: bool = False) -> list[Event]:
-    """What happened, in the order of time, also as its lanes tell; of the `others` without target and air."""
+def events(log: FlightLog, lanes: Mapping[str, Sequence[Change]], shared: bool = True) -> list[Event]:
+    """The events of a flight, sorted by time, those of its `lanes` included.
+
+    Without `shared`, the events of target and air are left out: another flight in the same view has them.
+    """
     if not len(log):
         return [Event(0.0, "WARN", _end_text(log))]
-    found = [*_crossing(log), *(() if others else _gust(log))]
-    for name, changes in told.items():
-        if others and name in ("air", "target"):
+    events = [*_crossing(log), *(_gust(log) if shared else ())]
+    for name, changes in lanes.items():
+        if not shared and name in ("air", "target"):
             continue
         states = [change for change in changes if change.state != log.outcome.value]
         if len(states) > MOST_EVENTS:
-            found.append(Event(states[0].time, "INFO", f"{name}: {states[0].state}; then {len(states) - 1} changes"))
+            events.append(Event(states[0].time, "INFO", f"{name}: {states[0].state}; then {len(states) - 1} changes"))
         else:
-            found += [Event(time, _level(state), f"{name}: {state}") for time, state in states]
+            events += [Event(time, _level(state), f"{name}: {state}") for time, state in states]
     completed = log.outcome is Outcome.COMPLETED
-    found.append(Event(float(log["time"][-1]), "INFO" if completed else "WARN", _end_text(log)))
-    return sorted(found, key=lambda event: event.time)
+    events.append(Event(float(log["time"][-1]), "INFO" if completed else "WARN", _end_text(log)))
+    return sorted(events, key=lambda event: event.time)
 
 
 def command_lane(log: FlightLog) -> list[Change]:
-    """Whether the command is at its limit: all of a window, part of it, or not at all."""
+    """Whether the command is at its limit: for a whole window, for part of it, or not at all."""
     held = np.abs(log["heading_rate_command"]) < np.abs(log["unlimited_command"])
     shares = [float(part.mean()) for part in _windows(log, held.astype(float))]
     return _lane(log, ["at the limit" if s == 1.0 else "on and off the limit" if s else "free" for s in shares])
@@ -113,14 +116,14 @@ def _circle(log: FlightLog) -> list[Change]:
     tolerance = log.flight.metrics.tolerance
     settled = Signals(log).settling_time()
     inside = [bool((np.abs(part) < tolerance).all()) for part in _windows(log, log["range_error"])]
-    changes = _lane(log, ["within tolerance" if one else "outside tolerance" for one in inside])
+    changes = _lane(log, ["within tolerance" if is_inside else "outside tolerance" for is_inside in inside])
     if settled is None:
         return changes
     return [*(change for change in changes if change.time < settled), Change(settled, "converged")]
 
 
 def _aircraft(log: FlightLog) -> list[Change]:
-    """Stall and bank limit, as the airframe's own data have them; nothing of a plant without an airframe."""
+    """Stall and bank limit, from the airframe's own data; empty for a plant without an airframe."""
     if np.isnan(log["angle_of_attack"]).all():
         return []
     limits = aircraft.limits(aircraft.folder(log.flight.aircraft))
@@ -134,7 +137,7 @@ def _aircraft(log: FlightLog) -> list[Change]:
 
 
 def _air(log: FlightLog) -> list[Change]:
-    """Windows by their strongest gust; nothing in steady wind."""
+    """The strongest gust of each window; empty in steady wind."""
     gusts = _gusts(log) / log.flight.start.airspeed
     if not (gusts > 1e-9).any():
         return []
@@ -144,7 +147,7 @@ def _air(log: FlightLog) -> list[Change]:
 
 
 def _target(log: FlightLog) -> list[Change]:
-    """What a moving target does."""
+    """Whether a moving target speeds up, slows down, turns or goes straight; empty for a target at rest."""
     speed = np.hypot(log["target_velocity_north"], log["target_velocity_east"])
     acceleration, turn = log["target_acceleration"], log["target_turn_rate"]
     if not speed.any():
@@ -159,7 +162,7 @@ def _target(log: FlightLog) -> list[Change]:
 
 
 def _ending(log: FlightLog) -> list[Change]:
-    """How a flight ended early."""
+    """The outcome of a flight that ended early."""
     return [] if log.outcome is Outcome.COMPLETED else [Change(float(log["time"][-1]), log.outcome.value)]
 
 
@@ -199,7 +202,7 @@ def _windows(log: FlightLog, values: NDArray[np.float64]) -> list[NDArray[np.flo
 
 
 def _begins(log: FlightLog) -> list[int]:
-    """The first row of each window; what is left at the end belongs to the last."""
+    """The first row of each window; rows that are left at the end belong to the last window."""
     rows = max(1, round(WINDOW / log.flight.guidance_period))
     return list(range(0, max(1, len(log) - rows + 1), rows))
 

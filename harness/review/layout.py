@@ -1,4 +1,4 @@
-"""The layout of a recording: its tabs, each plot with room for its legend beside the curves."""
+"""The layout of a recording: its tabs and views, with room for a legend beside the curves of each plot."""
 
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
@@ -12,10 +12,10 @@ from harness.review.styled import WORDS, StyledFlight
 
 _RIGHT = 950.0  # points: width of the column of plots in a window 1600 wide
 _HEIGHT = 870.0  # points: height of all tabs in a window 1000 high
-_LANE, _LANES = 38.0, 52.0  # points: height of a lane, and of what is around all of them
+_LANE, _LANES = 38.0, 52.0  # points: height of a lane, and of the frame around all lanes
 _EVENTS = 190.0  # points: height of the events
-_LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of all else there
-_ENTRY, _AROUND_LEGEND = 23.5, 70.0  # points: height of a line of a legend, and of all else in its row
+_LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of the rest of it
+_ENTRY, _AROUND_LEGEND = 23.5, 70.0  # points: height of a line of a legend, and of the rest of its row
 _AXIS = 35.0  # points: width of the numbers beside a plot
 _MOST_WITH_CHASE = 3  # flights
 PlayState = Literal["following", "paused"]
@@ -23,7 +23,7 @@ Tab = rrb.Container | rrb.View
 
 
 class Content(NamedTuple):
-    """All that there is to lay out."""
+    """Everything that is laid out."""
 
     flights: Sequence[StyledFlight]
     overview: Sequence[Plot]
@@ -31,12 +31,12 @@ class Content(NamedTuple):
     aircraft: Sequence[Plot]
     target: Sequence[Plot]
     lanes: int
-    until: float  # s: the time that plots of whole flights end with
-    growing: bool = False  # flights are shown while they are flown: the range of their values is not known yet
+    until: float  # s: the end of the time axis of plots over a whole flight
+    growing: bool = False  # a flight is shown while it is flown: the range of its values is not known yet
 
 
 def layout(content: Content) -> rrb.Blueprint:
-    """Five tabs; the cursor stands at the start, the panels of the viewer are out of the way."""
+    """Five tabs, with the cursor at the start and the panels of the viewer collapsed."""
     tabs = [
         _overview(content),
         _around_the_cursor(content),
@@ -60,12 +60,14 @@ def layout(content: Content) -> rrb.Blueprint:
 
 
 def _overview(content: Content) -> Tab:
-    """Left what the eye follows, right the plots; the modes of many flights are on the left, in the chase's place."""
+    """Scene, chase view, events on the left, plots on the right; the lanes of many flights replace the chase view."""
     flights, plots = content.flights, {plot.name: plot for plot in content.overview}
     many = len(flights) > _MOST_WITH_CHASE
     legends = [plot for plot in content.overview if len(flights) == 1 or plot.name == "range_error"]
     gutter = _gutter(legends, _RIGHT)
-    lanes = rrb.StateTimelineView(origin="/lanes", name="Modes", time_view=_whole(content, 0.02 if many else gutter))
+    lanes = rrb.StateTimelineView(
+        origin="/lanes", name="Modes", time_view=_whole_flight(content, 0.02 if many else gutter)
+    )
     lanes_height = _LANES + _LANE * content.lanes
 
     rows: list[Tab] = [_strip(plot, content, gutter) for plot in legends]
@@ -93,7 +95,7 @@ def _overview(content: Content) -> Tab:
 def _around_the_cursor(content: Content) -> Tab:
     flights = content.flights
     left = rrb.Vertical(chase_view(flights[-1], flights), scene_view(flights, 1.8), row_shares=(3.0, 2.0))
-    axis = rrb.TimeAxis(link="LinkToGlobal")  # Rerun shows 30 s to either side, whatever range is asked for
+    axis = rrb.TimeAxis(link="LinkToGlobal")  # Rerun shows 30 s to either side, whatever range is set
     right = [
         _view(
             plot,
@@ -113,12 +115,12 @@ def _event_view() -> rrb.View:
 
 
 def _target(content: Content) -> Tab:
-    believed, *plots = sorted(content.target, key=lambda plot: plot.name != "range_error_seen")
-    if believed.name != "range_error_seen":
+    seen, *plots = sorted(content.target, key=lambda plot: plot.name != "range_error_seen")
+    if seen.name != "range_error_seen":
         left: Tab = scene_view(content.flights, 0.6, "Target and circle")
-        plots = [believed, *plots]
+        plots = [seen, *plots]
     else:
-        below = _strip(believed, content, _gutter([believed], 530.0))
+        below = _strip(seen, content, _gutter([seen], 530.0))
         left = rrb.Vertical(scene_view(content.flights, 0.95, "Target and circle"), below, row_shares=(2.0, 1.0))
     right = _grid(plots, content, 2, 1060.0)
     return rrb.Horizontal(left, right, column_shares=(1.0, 2.0), name="Target")
@@ -127,7 +129,7 @@ def _target(content: Content) -> Tab:
 def _grid(
     plots: Sequence[Plot], content: Content, columns: int, width: float, name: str | None = None
 ) -> rrb.Container:
-    """In rows of `columns`; with a legend where its names say more than the flights' colours."""
+    """A grid of plots with `columns` columns, with legends unless they would only repeat the colours of the flights."""
     legend = len(content.flights) == 1 or plots is not content.aircraft
     gutter = _gutter(plots, width / columns) if legend else 0.02
     views = [_strip(plot, content, gutter, legend=legend) for plot in plots]
@@ -140,12 +142,12 @@ def _beside(plots: Sequence[Plot], content: Content) -> list[Tab]:
 
 
 def _strip(plot: Plot, content: Content, gutter: float, *, legend: bool = True) -> rrb.View:
-    near = content.growing and plot.name != "heading_rate"  # whose range is known: the limit's
-    return _view(plot, _whole(content, gutter), legend=legend, title=plot.title, near=near)
+    near = content.growing and plot.name != "heading_rate"  # its range is known: the limit
+    return _view(plot, _whole_flight(content, gutter), legend=legend, title=plot.title, near=near)
 
 
 def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, near: bool = False) -> rrb.View:
-    """`near`: the values of the times shown fill the plot."""
+    """One plot. With `near`, its axis follows the values at the times in view."""
     return rrb.TimeSeriesView(
         origin=f"/plots/{plot.name}",
         name=title,
@@ -155,21 +157,21 @@ def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, ne
     )
 
 
-def _whole(content: Content, gutter: float) -> rrb.TimeAxis:
-    """The whole flight, and beside it a share of the width for the legend."""
+def _whole_flight(content: Content, gutter: float) -> rrb.TimeAxis:
+    """The time axis of the whole flight; a share `gutter` of the width is left for the legend."""
     begin, last = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (0.0, content.until / (1.0 - gutter)))
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(begin, last))
 
 
 def _heights(legends: Sequence[float], rows: int, room: float) -> list[float]:
-    """Heights of the rows: what its legend takes for each that needs more than its share, the rest alike."""
+    """Heights of the rows: a row whose legend needs more than an equal share gets it, the others share the rest."""
     tall = [height if height > room / rows else 0.0 for height in [*legends, *[0.0] * (rows - len(legends))]]
     even = (room - sum(tall)) / max(1, tall.count(0.0))
     return [height or even for height in tall]
 
 
 def _entries(plot: Plot) -> int:
-    """Lines of the legend: names that are the same share one."""
+    """The number of lines in the legend; equal names share a line."""
     return len({name for series in plot.series for name in series.names})
 
 
@@ -179,11 +181,11 @@ def _gutter(plots: Sequence[Plot], width: float) -> float:
 
 
 def _coloured(plot: Plot, flights: Sequence[StyledFlight]) -> str:
-    """The title with the colours in words: where the curves fill the plot, a legend would lie on them."""
+    """The title with the colours in words, for plots whose curves leave no room for a legend."""
     if len(flights) == 1:
         shades = ("dim", "pale", WORDS[flights[0].colour])
         names = plot.series[-1].names
         words = [f"{name} {shade}" for name, shade in zip(names, shades[-len(names) :], strict=True)]
     else:
-        words = [f"{one.name} {WORDS[one.colour]}" for one in flights]
+        words = [f"{flight.name} {WORDS[flight.colour]}" for flight in flights]
     return f"{plot.title}: {', '.join(words)}"

@@ -1,4 +1,4 @@
-"""A flight shown while it is flown: streamed to an open viewer, at a pace."""
+"""Streams a flight to an open viewer while it is flown, at a given pace."""
 
 import time
 from collections.abc import Callable
@@ -16,16 +16,16 @@ from harness.review.scene import log_airframe, log_motion, log_surroundings, log
 from harness.review.styled import StyledFlight, styled
 from harness.review.viewer import PORT, ViewerError, address, listening
 
-_EVERY = 0.1  # s, on the clock: between two parcels
+_EVERY = 0.1  # s of real time between two parcels
 _LANES_EVERY = 1.0  # s
-_PATIENCE = 2.0  # s: longer than this no parcel takes, unless the viewer is gone
+_PATIENCE = 2.0  # s: a parcel that takes longer means that the viewer is gone
 
 
 class Live:
-    """Watches a flight (`harness.loop.Watch`) and streams it; `finish` tells what is known only in the end."""
+    """A `harness.loop.Watch` that streams the flight; `finish` adds what is known only at its end."""
 
     def __init__(self, name: str, title: str, pace: float, port: int = PORT) -> None:
-        """`pace` is times real time; infinite: as fast as it flies. Raises `ViewerError` when there is no viewer."""
+        """`pace` is relative to real time; infinite means no waiting. Raises `ViewerError` when there is no viewer."""
         if not listening(port):
             raise ViewerError(f"no viewer listens on port {port}: open one with `harness view` in another terminal")
         self.gone = False  # the viewer was closed; the flight goes on
@@ -35,10 +35,10 @@ class Live:
         self._to.stream.set_log_time_enabled(False)
         self._begin = self._last = self._last_lanes = time.monotonic()
         self._sent, self._trail = 0, 0  # rows
-        self._lanes: dict[str, dict[float, str]] = {}  # what was sent
+        self._lanes: dict[str, dict[float, str]] = {}  # the changes sent so far: by lane, by time
 
     def __call__(self, at: float, so_far: Callable[[], FlightLog]) -> None:
-        """After each row: waits for the clock, and now and then sends what is new."""
+        """After each row of the log: keeps the pace, and sends the new rows every `_EVERY` seconds."""
         ahead = self._begin + at / self._pace - time.monotonic()
         if ahead > 0.0:
             time.sleep(ahead)
@@ -48,44 +48,44 @@ class Live:
             self._send(so_far())
 
     def finish(self, log: FlightLog, command: str) -> None:
-        """The rest of the flight, and the story of the whole."""
+        """Sends the rest of the flight, its lanes, events and notes; `command` is shown as the way to repeat it."""
         if self.gone:
             return
         self._send(log)
-        one = styled({self._name: log})
+        flights = styled({self._name: log})
         self._close_lanes(log)
-        log_story(self._to, one, self._title, "", command)
+        log_story(self._to, flights, self._title, "", command)
         self._flush()
         if not self.gone:
             self._to.stream.disconnect()
 
     def _send(self, log: FlightLog) -> None:
-        """The rows since the last parcel."""
-        (one,) = styled({self._name: log})
+        """Sends the rows since the last parcel."""
+        (flight,) = styled({self._name: log})
         new = FlightLog(log.flight, log.outcome, log.reason, log.table[self._sent :])
         if not len(new):
             return
-        content = content_of([one._replace(log=new)], lanes=2 + (log.flight.plant == "sixdof"))
+        content = content_of([flight._replace(log=new)], lanes=2 + bool(np.isfinite(log["angle_of_attack"]).any()))
         if not self._sent:
-            self._open(one, content)
+            self._open(flight, content)
         for plot in (*content.overview, *content.aircraft, *content.target):
             self._send_plot(plot)
         log_target(self._to, new)
-        log_motion(self._to, one, new)
+        log_motion(self._to, flight, new)
         since = FlightLog(log.flight, log.outcome, log.reason, log.table[self._trail :])
-        self._trail += log_trail(self._to, one, since)
+        self._trail += log_trail(self._to, flight, since)
         self._sent = len(log)
         if self._last - self._last_lanes >= _LANES_EVERY:
             self._last_lanes = self._last
             self._send_lanes(log)
         self._flush()
 
-    def _open(self, one: StyledFlight, content: Content) -> None:
-        """The layout for the whole flight, though it has just begun."""
-        self._to.layout(layout(content._replace(until=one.log.flight.duration, growing=True)))
+    def _open(self, flight: StyledFlight, content: Content) -> None:
+        """Sends the layout of the whole flight and everything that does not change."""
+        self._to.layout(layout(content._replace(until=flight.log.flight.duration, growing=True)))
         self._to.stream.send_recording_name(self._title)
-        log_surroundings(self._to, one.log)
-        log_airframe(self._to, one, [one])
+        log_surroundings(self._to, flight.log)
+        log_airframe(self._to, flight, [flight])
         for plot in (*content.overview, *content.aircraft, *content.target):
             for i, series in enumerate(plot.series):
                 log_style(self._to, _entity(plot, i), series)
@@ -95,7 +95,7 @@ class Live:
             log_values(self._to, _entity(plot, i), series)
 
     def _send_lanes(self, log: FlightLog) -> None:
-        """The changes that are new, but for the last window, which is not full yet."""
+        """Sends the new changes, without those of the last window, which is not complete yet."""
         for name, changes in lanes(log).items():
             sent = self._lanes.setdefault(name, {})
             new = [c for c in changes if c.time not in sent and c.time < log["time"][-1] - 1.0]
@@ -103,7 +103,7 @@ class Live:
             log_lane(self._to, name, new)
 
     def _close_lanes(self, log: FlightLog) -> None:
-        """The lanes as the whole flight has them, also where a parcel said otherwise."""
+        """Sends the lanes of the whole flight, which may correct what a parcel sent earlier."""
         for name, changes in lanes(log).items():
             times = sorted({change.time for change in changes} | set(self._lanes.get(name, {})))
             since = np.searchsorted([change.time for change in changes], times, side="right") - 1
@@ -115,7 +115,7 @@ class Live:
             if listening(self._port):
                 self._to.stream.flush(timeout_sec=_PATIENCE)
                 return
-        except Exception:  # Rerun has no name for it
+        except Exception:  # Rerun raises no error of its own
             pass
         self.gone = True
 

@@ -1,4 +1,4 @@
-"""The words of a recording, in Markdown: results, feasibility, settings, provenance, and the command that made it."""
+"""The notes of a recording, in Markdown: results, feasibility, settings, provenance, and the command that made it."""
 
 import json
 import platform
@@ -19,19 +19,19 @@ _packages = cache(packages)
 
 
 def result_notes(flights: Sequence[StyledFlight], title: str, above: str, command: str) -> str:
-    """What came out, a column per flight, and how to get it again."""
+    """The results, with a column per flight, and the command that repeats them; `above` is Markdown to precede them."""
     parts = [f"# {title}"]
     parts += [above] if above else []
-    said: dict[str, list[str]] = {}
-    for one in flights:
-        for line in (feasibility_line(one.log.flight), *(f"warning: {w}" for w in warnings(one.log.flight))):
-            said.setdefault(line, []).append(one.name)
-    of = {line: "" if len(names) == len(flights) else f" ({', '.join(names)})" for line, names in said.items()}
-    parts.append("\n".join(f"- {line}{of[line]}" for line in said))
-    judged = [measure(one.log) for one in flights]
+    names_by_line: dict[str, list[str]] = {}
+    for flight in flights:
+        for line in (feasibility_line(flight.log.flight), *(f"warning: {w}" for w in warnings(flight.log.flight))):
+            names_by_line.setdefault(line, []).append(flight.name)
+    of = {line: "" if len(names) == len(flights) else f" ({', '.join(names)})" for line, names in names_by_line.items()}
+    parts.append("\n".join(f"- {line}{of[line]}" for line in names_by_line))
+    judged = [measure(flight.log) for flight in flights]
     wide = len(flights) < 3  # enough room for the meaning
     ends = [f"{f.log.outcome.value}{': ' if f.log.reason else ''}{f.log.reason}" for f in flights]
-    head = ["metric", *(one.name for one in flights), *(["meaning"] if wide else [])]
+    head = ["metric", *(flight.name for flight in flights), *(["meaning"] if wide else [])]
     rows = [["outcome", *ends, *(["how it ended"] if wide else [])]]
     rows += [[name, *(number(m[name]) for m in judged), *([METRICS[name].meaning] if wide else [])] for name in METRICS]
     parts.append(_table([head, *rows]))
@@ -40,7 +40,7 @@ def result_notes(flights: Sequence[StyledFlight], title: str, above: str, comman
 
 
 def settings_notes(flights: Sequence[StyledFlight]) -> str:
-    """Provenance of the recording, the settings of the first flight whole, and of the others what differs."""
+    """The provenance of the recording, the differences in settings, and all settings of the first flight."""
     made_with = {
         **_packages(),
         "physics": str(PHYSICS_VERSION),
@@ -52,13 +52,13 @@ def settings_notes(flights: Sequence[StyledFlight]) -> str:
         _table([["flight", "key", "digest"], *([f.name, flight_key(f.log.flight), f.log.digest] for f in flights)])
     )
     first = by_column(document(flights[0].log.flight))
-    for one in flights[1:]:
-        other = by_column(document(one.log.flight))
+    for flight in flights[1:]:
+        other = by_column(document(flight.log.flight))
         differs = [
             [k, _word(first.get(k)), _word(other.get(k))] for k in {**first, **other} if first.get(k) != other.get(k)
         ]
-        parts.append(f"## {one.name} beside {flights[0].name}")
-        parts.append(_table([["setting", flights[0].name, one.name], *differs]) if differs else "the same settings")
+        parts.append(f"## {flight.name} beside {flights[0].name}")
+        parts.append(_table([["setting", flights[0].name, flight.name], *differs]) if differs else "the same settings")
     parts += [
         f"## Settings: {flights[0].name}",
         _table([["setting", "value"], *([k, _word(v)] for k, v in first.items())]),
@@ -66,8 +66,8 @@ def settings_notes(flights: Sequence[StyledFlight]) -> str:
     return "\n\n".join(parts)
 
 
-def kept(log: FlightLog, place: int) -> str:
-    """The flight without its rows, as JSON: with them it can be read back as it was, and at its place among others."""
+def flight_json(log: FlightLog, place: int) -> str:
+    """Settings and outcome of a flight, and its place among others, as JSON; with the rows they restore the log."""
     return json.dumps(
         {"place": place, "flight": document(log.flight), "outcome": log.outcome.value, "reason": log.reason}
     )

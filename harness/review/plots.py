@@ -1,4 +1,4 @@
-"""Plots over time: which lines each has, from a flight's log, and the range of values it shows."""
+"""Plots over time: the lines of each plot, from the logs of flights, and its range of values."""
 
 import math
 from collections.abc import Sequence
@@ -13,45 +13,45 @@ Array = NDArray[np.float64]
 
 DEG = 180.0 / math.pi
 _DIM: Colour = (85, 115, 165)
-MOST_WITH_COMMANDS = 2  # flights; of more, the commands would hide what was flown
+MOST_WITH_COMMANDS = 2  # flights; with more, the commands would hide the flown values
 
 
 class Series(NamedTuple):
-    """Lines that share their times, the first drawn undermost: one entity of the recording. In the plot's unit."""
+    """Lines that share their times, in the unit of the plot; the first is drawn at the bottom. One Rerun entity."""
 
     names: tuple[str, ...]
     colours: tuple[Colour, ...]
     widths: tuple[float, ...]
     time: Array
     values: Array  # (times, lines)
-    variances: Array | None = None  # as `values`: a band of one standard deviation to either side
+    variances: Array | None = None  # (times, lines): drawn as a band of one standard deviation to either side
 
 
 class Plot(NamedTuple):
-    """What there is to draw in one plot, from below to above."""
+    """One plot; the first of its series is drawn at the bottom."""
 
     name: str
     title: str
     series: list[Series]
-    span: tuple[float, float]  # the values shown
+    span: tuple[float, float]  # the range of values in view
 
 
 class _Line(NamedTuple):
-    """A column of the log, as its plot's legend calls it where one flight is shown."""
+    """A column of the log, and its label in the legend of a single flight."""
 
     column: str
     label: str
 
 
 class _Content(NamedTuple):
-    """What a plot shows of each flight; one SI unit is `scale` of the plot's."""
+    """The lines of a plot for each flight; `scale` converts SI to the unit of the plot."""
 
     name: str
     title: str
     unit: str
     scale: float
     lines: tuple[_Line, ...]
-    least: float = 0.1  # of the unit: the smallest span of values that is shown
+    least: float = 0.1  # the smallest span of values in view, in the unit of the plot
 
 
 _OVERVIEW = (
@@ -99,16 +99,20 @@ _AIRCRAFT = (
         (_Line("wind_down", "down"), _Line("wind_east", "east"), _Line("wind_north", "north")),
     ),
 )
-_SHADES: tuple[tuple[Colour, float], ...] = ((LIGHT, 0.0), (LIGHT, 0.65), (_DIM, 0.8))  # of a flight's lines
+_SHADES: tuple[tuple[Colour, float], ...] = (
+    (LIGHT, 0.0),
+    (LIGHT, 0.65),
+    (_DIM, 0.8),
+)  # of the lines of a flight, from the top
 
 
 def overview_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
-    """What the law does and what the aircraft makes of it. A column that a plant has not is left out."""
+    """Plots of the law's commands and of the aircraft's response, without columns that no plant here has."""
     return [plot for content in _OVERVIEW if (plot := _plot(content, flights))]
 
 
 def aircraft_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
-    """The aircraft itself and the air around it; of several flights each line has its own plot, unless it is zero."""
+    """Plots of the aircraft and the air. With several flights, each line that is not zero has its own plot."""
     if len(flights) == 1:
         return [plot for content in _AIRCRAFT if (plot := _plot(content, flights))]
     parts = [part for content in _AIRCRAFT for part in _split(content)]
@@ -117,20 +121,22 @@ def aircraft_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
 
 
 def end(flights: Sequence[StyledFlight]) -> float:
-    """The time of the last row, s; above zero."""
-    return max((float(one.log["time"][-1]) for one in flights if len(one.log)), default=0.0) or 1.0
+    """The time of the last row of all flights, s; 1 if there is none later than 0."""
+    return max((float(flight.log["time"][-1]) for flight in flights if len(flight.log)), default=0.0) or 1.0
 
 
 def level(label: str, values: Sequence[float], until: float, colour: Colour = GREY) -> Series:
-    """Horizontal lines over the whole flight under one legend."""
-    one = np.array([values, values])
-    return Series((label,) * len(values), (colour,) * len(values), (1.0,) * len(values), np.array((0.0, until)), one)
+    """Horizontal lines from time 0 to `until`, s, with one label."""
+    both_ends = np.array([values, values])
+    return Series(
+        (label,) * len(values), (colour,) * len(values), (1.0,) * len(values), np.array((0.0, until)), both_ends
+    )
 
 
 def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
-    """All values with a margin, at least `least` wide, and with two numbers on the axis.
+    """The range of all values with a margin: at least `least` wide, and with two labelled numbers on the axis.
 
-    Rerun labels powers of ten, and their multiples where there is room: for about seven in our plots.
+    Rerun labels powers of ten, and their multiples where there is room, which is for about seven in these plots.
     """
     low, high = _extent(series)
     if not high - low >= least:
@@ -141,7 +147,7 @@ def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
     if high - low > 7.0 * step:
         step *= 10.0
     first, last = math.ceil(low / step), math.floor(high / step)
-    most = 0.7 * (high - low)  # of room given away for a number
+    most = 0.7 * (high - low)  # the most by which the range grows to contain another number
     if first > last and step <= most + (high - low):  # no number: both neighbours
         return last * step - margin, first * step + margin
     if first == last:  # one: the neighbour that is nearer
@@ -152,7 +158,7 @@ def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
 
 
 def finite(series: Series) -> Series | None:
-    """The lines that have values; None when none has."""
+    """The lines that have finite values; None if no line has any."""
     drawn = np.isfinite(series.values).any(axis=0)
     if not drawn.any():
         return None
@@ -177,21 +183,21 @@ def _split(content: _Content) -> list[_Content]:
 
 
 def _plot(content: _Content, flights: Sequence[StyledFlight]) -> Plot | None:
-    flown = [kept for one in flights if (kept := finite(_series(content, one, len(flights))))]
+    flown = [drawn for flight in flights if (drawn := finite(_series(content, flight, len(flights))))]
     if not flown:
         return None
     series = [*_bounds(content.name, flights), *flown]
     return Plot(content.name, f"{content.title} [{content.unit}]", series, _span(content, series, flights))
 
 
-def _series(content: _Content, one: StyledFlight, flights: int) -> Series:
+def _series(content: _Content, flight: StyledFlight, flights: int) -> Series:
     lines = content.lines if flights == 1 else content.lines[-2 if flights <= MOST_WITH_COMMANDS else -1 :]
-    names = [line.label if flights == 1 else _name(one.name, line, lines) for line in lines]
+    names = [line.label if flights == 1 else _name(flight.name, line, lines) for line in lines]
     shades = reversed(_SHADES[: len(lines)])
-    colours = tuple(mixed(one.colour, *shade) for shade in shades)
-    widths = (*[1.0 if one.width < 2.0 else 2.0] * (len(lines) - 1), one.width)
-    values = content.scale * np.column_stack([one.log[line.column] for line in lines])
-    return Series(tuple(names), colours, widths, one.log["time"], values)
+    colours = tuple(mixed(flight.colour, *shade) for shade in shades)
+    widths = (*[1.0 if flight.width < 2.0 else 2.0] * (len(lines) - 1), flight.width)
+    values = content.scale * np.column_stack([flight.log[line.column] for line in lines])
+    return Series(tuple(names), colours, widths, flight.log["time"], values)
 
 
 def _name(flight: str, line: _Line, lines: Sequence[_Line]) -> str:
@@ -199,8 +205,8 @@ def _name(flight: str, line: _Line, lines: Sequence[_Line]) -> str:
 
 
 def _bounds(name: str, flights: Sequence[StyledFlight]) -> list[Series]:
-    """What the values are to be compared with, where it is the same at all times."""
-    several = [one.log.flight for one in flights]
+    """Constant lines to compare with the values: tolerance, limit, nominal airspeed, commanded altitude."""
+    several = [flight.log.flight for flight in flights]
     if name == "range_error":
         label, unit, both, values = "tolerance", "m", True, {f.metrics.tolerance for f in several}
     elif name == "heading_rate":
@@ -220,14 +226,14 @@ def _bounds(name: str, flights: Sequence[StyledFlight]) -> list[Series]:
 
 
 def _span(content: _Content, series: Sequence[Series], flights: Sequence[StyledFlight]) -> tuple[float, float]:
-    """All of a curve, but of the range error before half-time what is near, and of heading rates the limit's."""
+    """The range of a plot: range errors of the first half are clipped, heading rates are shown up to their limit."""
     if content.name == "range_error":
-        near = max(0.5 * one.log.flight.law.standoff for one in flights)
+        near = max(0.5 * flight.log.flight.law.standoff for flight in flights)
         clipped = [
             s._replace(values=np.vstack([s.values.clip(-near, near), s.values[len(s.values) // 2 :]])) for s in series
         ]
         return span(clipped)
-    limit = DEG * max(one.log.flight.law.max_heading_rate for one in flights)
+    limit = DEG * max(flight.log.flight.law.max_heading_rate for flight in flights)
     if content.name == "heading_rate" and math.isfinite(limit):
         ten = 10.0 ** math.ceil(math.log10(limit))
         high = max(1.3 * limit, 1.04 * ten if ten <= 2.0 * limit else 0.0)  # with a number on the axis, if near

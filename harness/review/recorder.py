@@ -1,4 +1,4 @@
-"""A Rerun stream as the harness writes it: one timeline, whole columns, whole nanoseconds."""
+"""The Rerun stream of a recording: one timeline, complete columns, times in whole nanoseconds."""
 
 from collections.abc import Iterable
 
@@ -14,29 +14,31 @@ APPLICATION = "standoff-harness"
 
 
 class Recorder:
-    """Sends to one Rerun recording stream."""
+    """Logs to one Rerun recording stream."""
 
     TIMELINE = "sim_time"
 
     def __init__(self) -> None:
-        self.stream = rr.RecordingStream(APPLICATION, send_properties=False)  # the hour of writing says nothing
+        self.stream = rr.RecordingStream(
+            APPLICATION, send_properties=False
+        )  # without the time of writing: equal flights give equal recordings
 
     @staticmethod
     def flight(name: str) -> str:
-        """The entity under which a flight is."""
+        """The path of the entity that holds a flight."""
         return rr.new_entity_path(["runs", name])
 
     def once(self, entity: str, what: rr.AsComponents) -> None:
-        """For all times."""
+        """Logs something that holds at all times."""
         self.stream.log(entity, what, static=True, strict=True)
 
     def columns(self, entity: str, time: Array, columns: Iterable[rr.ComponentColumn]) -> None:
-        """Whole columns, a row per time in s. Stamps are whole nanoseconds: floats it truncates, one off at times."""
+        """Logs columns, one row per time in s. Times are rounded to nanoseconds, which Rerun would truncate."""
         stamps = np.rint(time * 1e9).astype("timedelta64[ns]")
         self.stream.send_columns(entity, [rr.TimeColumn(self.TIMELINE, duration=stamps)], columns, strict=True)
 
     def layout(self, layout: rrb.Blueprint) -> None:
-        """`stream.send_blueprint(layout)`, which in Rerun 0.41 leaves two threads and 2 MB behind, done by hand."""
+        """Sends the layout. `stream.send_blueprint(layout)` of Rerun 0.41 would leave two threads and 2 MB behind."""
         blueprint = rr.RecordingStream._from_native(rerun_bindings.new_blueprint(APPLICATION, False, False))
         blueprint.set_time("blueprint", sequence=0)
         layout._log_to_stream(blueprint)
@@ -46,5 +48,5 @@ class Recorder:
 
 
 def clean_up() -> None:
-    """Ends the threads that Rerun keeps for every stream that was dropped."""
+    """Ends the threads that Rerun keeps for streams that are no longer used."""
     rerun_bindings.flush_and_cleanup_orphaned_recordings()

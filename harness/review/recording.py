@@ -1,4 +1,4 @@
-"""A recording of flights: everything logged to a Rerun stream, and written to a file whole or not at all."""
+"""Writes flights into a recording: everything is logged to a Rerun stream, then written to a file."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from harness.log import COLUMNS, FlightLog
 from harness.review.differences import difference_plots
 from harness.review.lanes import COLOURS, Change, events, lanes, summary
 from harness.review.layout import Content, layout
-from harness.review.notes import kept, result_notes, settings_notes
+from harness.review.notes import flight_json, result_notes, settings_notes
 from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
@@ -23,10 +23,11 @@ Logs = Mapping[str, FlightLog]
 
 
 def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command: str = "") -> None:
-    """Writes flights by name into one .rrd with its own layout. OSError when it cannot be written.
+    """Writes flights by name into one .rrd file with its own layout; the file is complete or absent.
 
     The first flight is the reference, drawn wide and pale under the others. `notes` is Markdown, shown above the
-    results; `command` is what to type for this recording. ValueError for more flights than can be told apart.
+    results; `command` is shown as the way to repeat the recording. Raises OSError when the file cannot be written,
+    ValueError for more flights than `styled.MOST`.
     """
     try:
         content = _encoded(logs, title, notes, command)
@@ -37,7 +38,7 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command
 
 
 def content_of(flights: Sequence[StyledFlight], lanes: int) -> Content:
-    """What is drawn of these flights, beside that many lanes."""
+    """All plots of these flights, to be laid out beside this number of lanes."""
     return Content(
         flights,
         overview_plots(flights),
@@ -50,7 +51,7 @@ def content_of(flights: Sequence[StyledFlight], lanes: int) -> Content:
 
 
 def log_series(to: Recorder, plot: Plot) -> None:
-    """The lines of a plot: Rerun draws them in the order of their entities' names."""
+    """Logs the lines of a plot; Rerun draws them in the order of their entities' names."""
     for i, series in enumerate(plot.series):
         entity = f"/plots/{plot.name}/{i:02}"
         log_style(to, entity, series)
@@ -58,7 +59,7 @@ def log_series(to: Recorder, plot: Plot) -> None:
 
 
 def log_style(to: Recorder, entity: str, series: Series) -> None:
-    """Names and looks. Zoomed out, Rerun's default halves peaks: `MinMax` shows both."""
+    """Logs names, colours and widths. Zoomed out, Rerun's default halves peaks; `MinMax` keeps both."""
     both_peaks = rr.components.AggregationPolicy.MinMax
     looks = rr.Measurements if series.variances is not None else rr.SeriesLines
     names, colours, widths = series[:3]
@@ -66,7 +67,7 @@ def log_style(to: Recorder, entity: str, series: Series) -> None:
 
 
 def log_values(to: Recorder, entity: str, series: Series) -> None:
-    """The values; of lines that never change, the ends."""
+    """Logs the values; of constant lines only the first and the last."""
     time, values, variances = series.time, series.values, series.variances
     if len(values) > 2 and variances is None and (values == values[0]).all():
         time, values = time[[0, -1]], values[[0, -1]]
@@ -79,7 +80,7 @@ def log_values(to: Recorder, entity: str, series: Series) -> None:
 
 
 def log_rows(to: Recorder, name: str, rows: FlightLog) -> None:
-    """The log as it is, as vectors: a third of the room that an entity per column takes."""
+    """Logs the rows of the log unchanged, as vectors: they take a third of the space of an entity per column."""
     entity = f"{to.flight(name)}/log"
     to.once(entity, rr.SeriesLines(names=COLUMNS))
     vectors = rr.Scalars.columns(scalars=rows.table.ravel()).partition([len(COLUMNS)] * len(rows))
@@ -87,39 +88,39 @@ def log_rows(to: Recorder, name: str, rows: FlightLog) -> None:
 
 
 def log_lane(to: Recorder, lane: str, changes: Sequence[Change]) -> None:
-    """A lane of states, each in its colour."""
+    """Logs a lane of states, each in its colour."""
     if not changes:
         return
-    entity = f"/lanes/{re.sub('[^0-9A-Za-z_.-]+', '_', lane)}"  # the viewer shows it: without escapes
+    entity = f"/lanes/{re.sub('[^0-9A-Za-z_.-]+', '_', lane)}"  # the viewer shows this name: no escapes
     to.once(entity, rr.StateConfiguration(values=list(COLOURS), labels=list(COLOURS), colors=list(COLOURS.values())))
     times = np.array([change.time for change in changes])
     to.columns(entity, times, rr.StateChange.columns(state=[change.state for change in changes]))
 
 
 def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: str, command: str) -> None:
-    """What can be told when the flights are over: modes, events, whole tracks, results and settings."""
+    """Logs what is known once the flights are over: lanes, events, complete tracks, results and settings."""
     several = len(flights) > 1
-    for i, one in enumerate(flights):
-        entity = to.flight(one.name)
-        to.once(f"{entity}/flight", rr.TextDocument(kept(one.log, i)))
-        log_tracks(to, one, one.log)
-        found = lanes(one.log)
-        for name, changes in ({f"{i + 1} {one.name}": summary(one.log)} if several else found).items():
+    for i, flight in enumerate(flights):
+        entity = to.flight(flight.name)
+        to.once(f"{entity}/flight", rr.TextDocument(flight_json(flight.log, i)))
+        log_tracks(to, flight, flight.log)
+        own_lanes = lanes(flight.log)
+        for name, changes in ({f"{i + 1} {flight.name}": summary(flight.log)} if several else own_lanes).items():
             log_lane(to, name, changes)
-        happened = events(one.log, found, others=i > 0)
+        happened = events(flight.log, own_lanes, shared=i == 0)
         texts = rr.TextLog.columns(
-            text=[f"{one.name}: {event.text}" if several else event.text for event in happened],
+            text=[f"{flight.name}: {event.text}" if several else event.text for event in happened],
             level=[event.level for event in happened],
-            color=[one.colour] * len(happened),
+            color=[flight.colour] * len(happened),
         )
-        to.columns(rr.new_entity_path(["events", one.name]), np.array([event.time for event in happened]), texts)
+        to.columns(rr.new_entity_path(["events", flight.name]), np.array([event.time for event in happened]), texts)
     markdown = rr.MediaType.MARKDOWN
     to.once("/notes/result", rr.TextDocument(result_notes(flights, title, notes, command), media_type=markdown))
     to.once("/notes/settings", rr.TextDocument(settings_notes(flights), media_type=markdown))
 
 
 def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
-    """The file's content. Made in memory: Rerun's own file sink waits for ever when the disk is full."""
+    """The content of the file, made in memory: Rerun's own file sink never returns when the disk is full."""
     flights = styled(logs)
     content = content_of(flights, len(flights) if len(flights) > 1 else len(lanes(flights[0].log)))
     to = Recorder()
@@ -128,12 +129,12 @@ def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     to.layout(layout(content))
     to.stream.send_recording_name(title)
     log_surroundings(to, flights[0].log)
-    log_target(to, max((one.log for one in flights), key=len))
-    for one in flights:
-        log_rows(to, one.name, one.log)
-        log_airframe(to, one, flights)
-        log_motion(to, one, one.log)
-        log_trail(to, one, one.log)
+    log_target(to, max((flight.log for flight in flights), key=len))
+    for flight in flights:
+        log_rows(to, flight.name, flight.log)
+        log_airframe(to, flight, flights)
+        log_motion(to, flight, flight.log)
+        log_trail(to, flight, flight.log)
     for plot in (*content.overview, *content.differences, *content.aircraft, *content.target):
         log_series(to, plot)
     log_story(to, flights, title, notes, command)

@@ -17,12 +17,12 @@ from harness.settings import flight_from_document
 
 FOLDER = Path("docs/images")
 TABS = ("overview", "cursor", "aircraft", "target", "notes")
-_SETTLES = 1.0  # s: the viewer fetches what it shows after it has drawn without it
-_GREETINGS = 6.0  # s: how long it covers a corner with what it has to say at its start
+_SETTLES = 1.0  # s: the viewer first draws, then fetches data that it lacks
+_GREETINGS = 6.0  # s: how long its messages at the start cover a corner
 
 
 class Screenshot(NamedTuple):
-    """Tabs of one recording at one time, s."""
+    """Pictures of some tabs of one recording, at one time in s."""
 
     name: str
     title: str
@@ -31,7 +31,7 @@ class Screenshot(NamedTuple):
 
 
 def main(folder: Path) -> None:
-    """Flies what is pictured, and takes the pictures."""
+    """Flies the flights and takes the pictures."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / "flights.rrd"
@@ -61,7 +61,7 @@ def shoot(viewer: ViewerClient, tab: str, at: float, path: Path) -> None:
 
 
 def _shrink(path: Path) -> None:
-    """To 256 colours: a third of the room, and nothing that the eye misses."""
+    """Reduces a picture to 256 colours: a third of the size, without a visible loss."""
     from PIL import Image  # Matplotlib's
 
     with Image.open(path) as picture:
@@ -72,10 +72,10 @@ def _shrink(path: Path) -> None:
 def _pictures() -> Iterator[tuple[Screenshot, Mapping[str, FlightLog]]]:
     moving = {"target": {"speed_mps": 2.0, "heading_deg": 20.0}, "estimator": {"kind": "ekf"}}
     gusty = {"wind": {"steady_mps": [2.0, 0.0], "turbulence": "light"}}
-    one = _flown("sixdof", 10.0, moving | gusty)
+    single = _flown("sixdof", 10.0, moving | gusty)
     yield (
         Screenshot("one-flight", "A moving target, estimated, in light turbulence", 60.0, TABS),
-        {"ultra_stick_25e": one},
+        {"ultra_stick_25e": single},
     )
     windy = {"wind": {"steady_mps": [3.0, 0.0]}}
     plants = ("kinematic", "lagged", "coordinated", "sixdof")

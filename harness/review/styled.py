@@ -1,4 +1,4 @@
-"""A flight as it is shown: one name, one colour and one width of line, everywhere."""
+"""Flights with their style: one name, colour and line width per flight, the same in every view."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,7 +9,7 @@ from harness.plants.ladder import rung
 
 Colour = tuple[int, int, int]
 
-MOST = 6  # flights in one recording; of more, no eye tells the colours apart
+MOST = 6  # flights in one recording: the colours of more cannot be told apart
 
 GREY: Colour = (125, 125, 125)
 LIGHT: Colour = (225, 225, 225)
@@ -24,7 +24,7 @@ _MAGENTA: Colour = (230, 110, 230)
 _YELLOW: Colour = (240, 220, 80)
 _CYAN: Colour = (90, 225, 235)
 _PALETTE = (_PALE_BLUE, _ORANGE, _GREEN, _MAGENTA, _YELLOW, _CYAN)
-_RUNGS = (_PALE_BLUE, _GREEN, _MAGENTA, _ORANGE)  # of the plants, up the ladder
+_RUNGS = (_PALE_BLUE, _GREEN, _MAGENTA, _ORANGE)  # the colours of the plants, from the bottom of the ladder
 WORDS: Mapping[Colour, str] = MappingProxyType(
     {
         _PALE_BLUE: "pale blue",
@@ -39,16 +39,16 @@ _WIDE, _THIN = 3.5, 1.5  # points on the screen
 
 
 class StyledFlight(NamedTuple):
-    """A flight and its looks; the first of several is the reference, drawn wide and pale under the others."""
+    """A flight with its style. The first of several is the reference, drawn wide and pale under the others."""
 
     name: str
     log: FlightLog
     colour: Colour
-    width: float
+    width: float  # points on the screen
 
 
 def styled(logs: Mapping[str, FlightLog]) -> list[StyledFlight]:
-    """Flights by name with their looks: a plant keeps its colour where it appears once. ValueError beyond `MOST`."""
+    """The flights with their styles; a plant that appears once keeps its colour. ValueError for 0 or beyond `MOST`."""
     if not 1 <= len(logs) <= MOST:
         raise ValueError(f"{len(logs)} flights: a recording shows 1 to {MOST}")
     plants = [log.flight.plant for log in logs.values()]
@@ -56,10 +56,10 @@ def styled(logs: Mapping[str, FlightLog]) -> list[StyledFlight]:
     if len(set(colours)) < len(colours):
         colours = list(_PALETTE[: len(colours)])
     widths = [_WIDE if len(logs) > 1 else _THIN, *[_THIN] * (len(logs) - 1)]
-    return [StyledFlight(*one) for one in zip(logs, logs.values(), colours, widths, strict=True)]
+    return [StyledFlight(*parts) for parts in zip(logs, logs.values(), colours, widths, strict=True)]
 
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:
-    """`colour` with a `share` of another."""
+    """`colour` mixed with a `share`, 0 to 1, of `other`."""
     r, g, b = (round((1.0 - share) * x + share * y) for x, y in zip(colour, other, strict=True))
     return r, g, b

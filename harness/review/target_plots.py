@@ -1,4 +1,4 @@
-"""The target over time: the estimate against the truth with its standard deviation, and the innovations."""
+"""Plots of the target: estimate, truth, standard deviation of the estimate, and innovations."""
 
 from collections.abc import Sequence
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from harness.review.plots import DEG, Array, Plot, Series, end, finite, level, span
 from harness.review.styled import ESTIMATE, GREY, TARGET, StyledFlight
 
-_BANDS = 2  # flights with bands; of more, they would hide each other
+_BANDS = 2  # flights: with more, their bands would hide each other
 _AXES = ("north", "east")
 
 
 def target_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
-    """Position and velocity of the target; where a flight estimates them, also the errors and the innovations."""
-    estimating = [one for one in flights if one.log.flight.estimator.filters and len(one.log)]
+    """Plots of the target's position and velocity and, for flights with an estimator, of its errors and innovations."""
+    estimating = [flight for flight in flights if flight.log.flight.estimator.filters and len(flight.log)]
     plots = []
     if estimating:
         plots += [_position_error(axis, estimating, flights) for axis in _AXES]
@@ -37,16 +37,17 @@ def _plot(name: str, title: str, series: list[Series]) -> Plot:
 def _position_error(axis: str, estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]) -> Plot:
     name = f"target_{axis}"
     series = [level("0", (0.0,), end(flights))]
-    for one in estimating:
-        error = one.log[f"{name}_seen"] - one.log[name]
-        series.append(_estimate(one, error, one.log[f"{name}_variance"], "error", flights))
+    for flight in estimating:
+        error = flight.log[f"{name}_seen"] - flight.log[name]
+        series.append(_estimate(flight, error, flight.log[f"{name}_variance"], "error", flights))
     return _plot(f"{name}_error", f"Target {axis}: error of the estimate ± 1σ [m]", series)
 
 
 def _velocity(axis: str, estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]) -> Plot:
     name = f"target_velocity_{axis}"
     series = [
-        _estimate(one, one.log[f"{name}_seen"], one.log[f"{name}_variance"], "estimate", flights) for one in estimating
+        _estimate(flight, flight.log[f"{name}_seen"], flight.log[f"{name}_variance"], "estimate", flights)
+        for flight in estimating
     ]
     band = ": estimate ± 1σ and truth" if estimating else ""
     return _plot(name, f"Target velocity {axis}{band} [m/s]", [*series, _truth(name, flights)])
@@ -56,25 +57,25 @@ def _innovation(
     of: str, unit: str, scale: float, estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]
 ) -> Plot:
     series = [level("0", (0.0,), end(flights))]
-    for one in estimating:
-        values = scale * one.log[f"innovation_{of}"]
+    for flight in estimating:
+        values = scale * flight.log[f"innovation_{of}"]
         new = np.isfinite(values)
-        colour, label = _looks(one, "innovation", flights)
-        series.append(Series((label,), (colour,), (1.0,), one.log["time"][new], values[new, np.newaxis]))
-    return _plot(f"innovation_{of}", f"Innovation, {of} [{unit}]", [kept for s in series if (kept := finite(s))])
+        colour, label = _looks(flight, "innovation", flights)
+        series.append(Series((label,), (colour,), (1.0,), flight.log["time"][new], values[new, np.newaxis]))
+    return _plot(f"innovation_{of}", f"Innovation, {of} [{unit}]", [drawn for s in series if (drawn := finite(s))])
 
 
 def _range_error_seen(estimating: Sequence[StyledFlight], flights: Sequence[StyledFlight]) -> Plot:
-    """What the law believed: its range error from the estimate."""
+    """The range error that the law computes from the estimate."""
     series = []
-    for one in estimating:
-        colour, name = _looks(one, "seen by the law", flights)
+    for flight in estimating:
+        colour, name = _looks(flight, "seen by the law", flights)
         names = (name,) if len(flights) > 1 else ("true", name)
         columns = ("range_error_seen",) if len(flights) > 1 else ("range_error", "range_error_seen")
-        new = _measured(one)
-        values = np.column_stack([one.log[column][new] for column in columns])
+        new = _measured(flight)
+        values = np.column_stack([flight.log[column][new] for column in columns])
         colours = (TARGET, colour)[-len(names) :]
-        series.append(Series(names, colours, (one.width,) * len(names), one.log["time"][new], values))
+        series.append(Series(names, colours, (flight.width,) * len(names), flight.log["time"][new], values))
     title = (
         "Range error, true and as the law sees it [m]" if len(flights) == 1 else "Range error as the law sees it [m]"
     )
@@ -83,34 +84,34 @@ def _range_error_seen(estimating: Sequence[StyledFlight], flights: Sequence[Styl
     )
 
 
-def _measured(one: StyledFlight) -> NDArray[np.bool_]:
-    """The rows with a new measurement; between them an estimate only goes on as it was."""
-    new = np.isfinite(one.log["innovation_range"])
+def _measured(flight: StyledFlight) -> NDArray[np.bool_]:
+    """The rows with a new measurement; in between, an estimate is only extrapolated."""
+    new = np.isfinite(flight.log["innovation_range"])
     new[:1] = True  # the filter starts from the first, which has no innovation
     return new
 
 
 def _estimate(
-    one: StyledFlight, values: Array, variances: Array, label: str, flights: Sequence[StyledFlight]
+    flight: StyledFlight, values: Array, variances: Array, label: str, flights: Sequence[StyledFlight]
 ) -> Series:
-    colour, name = _looks(one, label, flights)
-    bands = variances[_measured(one), np.newaxis] if len(flights) <= _BANDS else None
-    new = _measured(one)
-    return Series((name,), (colour,), (one.width,), one.log["time"][new], values[new, np.newaxis], bands)
+    colour, name = _looks(flight, label, flights)
+    bands = variances[_measured(flight), np.newaxis] if len(flights) <= _BANDS else None
+    new = _measured(flight)
+    return Series((name,), (colour,), (flight.width,), flight.log["time"][new], values[new, np.newaxis], bands)
 
 
 def _truth(column: str, flights: Sequence[StyledFlight]) -> Series:
-    """The target moves alike in all flights of a comparison; drawn is the longest."""
-    longest = max(flights, key=lambda one: len(one.log)).log
+    """The true target, from the longest flight: it moves alike in all flights of a comparison."""
+    longest = max(flights, key=lambda flight: len(flight.log)).log
     return Series(("truth",), (TARGET,), (1.5,), longest["time"], longest[column][:, np.newaxis])
 
 
-def _looks(one: StyledFlight, label: str, flights: Sequence[StyledFlight]) -> tuple[tuple[int, int, int], str]:
-    return (ESTIMATE, label) if len(flights) == 1 else (one.colour, one.name)
+def _looks(flight: StyledFlight, label: str, flights: Sequence[StyledFlight]) -> tuple[tuple[int, int, int], str]:
+    return (ESTIMATE, label) if len(flights) == 1 else (flight.colour, flight.name)
 
 
 def _near(series: Series) -> Series:
-    """The values with most of their bands: what counts is seen, though a filter starts from far off."""
+    """The series reduced to its usual range, bands included: a filter may start from far off."""
     values = series.values
     if series.colours[0] in (TARGET, GREY) or not len(values):
         return series
