@@ -122,13 +122,14 @@ class Metric:
 
     @property
     def column_heading(self) -> str:
-        """Heading and unit over a narrow column, a line for each word of the heading."""
-        return "\n".join([*self.heading.split(), "%" if self.percent else self.label])
+        """Heading and unit over a narrow column, a line for each word of the heading: shares are in percent."""
+        unit = "% yes" if self.unit == YES_OR_NO else "%" if self.percent else self.label
+        return "\n".join([*self.heading.split(), unit])
 
     @property
     def scale(self) -> float:
         """How many of the column's unit make the metric's own."""
-        return 100.0 if self.percent else 1.0
+        return 100.0 if self.percent or self.unit == YES_OR_NO else 1.0
 
 
 def measure(log: FlightLog) -> dict[str, float | bool | None]:

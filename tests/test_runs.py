@@ -24,7 +24,19 @@ from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, export, mixed_versions
 from harness.runs.store import JOURNAL, find, reading
 from harness.settings import read_settings
-from tests.builders import EXPERIMENTS, HERE, ROOT, command, copied_airframe, digests, fly_matrix, words_of, write
+from harness.verdict.pairs import settings_of
+from tests.builders import (
+    EXPERIMENTS,
+    HERE,
+    ROOT,
+    command,
+    copied_airframe,
+    digests,
+    fly_matrix,
+    result_matrix,
+    words_of,
+    write,
+)
 
 MATRIX = """\
 title = "A title"
@@ -78,6 +90,13 @@ def test_the_exported_table_says_of_each_column_what_it_is(file: Path, tmp_path:
     results = {"key", "outcome", "reason", "digest", "feasibility_margin_deg_s", "seconds", "run", "version"}
     assert {name for name, kind in kinds.items() if kind == "result"} == results
     assert schema.field("bank_peak_deg").metadata[b"unit"] == b"deg"
+
+
+def test_a_new_column_of_results_is_no_setting_and_leaves_the_pairs_as_they_are() -> None:
+    flights = result_matrix()
+    added = flights.assign(note=[f"of flight {i}" for i in range(len(flights))], smoothness_m=range(len(flights)))
+    assert settings_of(added) == settings_of(flights)
+    pd.testing.assert_frame_equal(harness.compare(added).differences, harness.compare(flights).differences)
 
 
 def test_results_flown_before_a_metric_was_added_have_its_column_without_a_value(

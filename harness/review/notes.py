@@ -13,7 +13,7 @@ from harness.provenance import packages
 from harness.review.styled import StyledFlight
 from harness.settings import document
 from harness.settings.columns import by_column
-from harness.tables import number
+from harness.tables import markdown, number
 
 _packages = cache(packages)
 
@@ -78,5 +78,5 @@ def _word(value: object) -> str:
 
 
 def _table(rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
-    return "\n".join([lines[0], "|" + "---|" * len(rows[0]), *lines[1:]])
+    """The first row holds the headings."""
+    return "\n".join(markdown(rows[0], rows[1:]))

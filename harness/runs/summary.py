@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from harness.metric import METRICS
+from harness.metric import METRICS, YES_OR_NO
 from harness.runs.matrix import Matrix
 from harness.runs.store import reading
 from harness.settings.columns import by_column
@@ -18,7 +18,7 @@ class Line(NamedTuple):
     labels: tuple[str, ...]  # the value of each axis
     outcomes: Mapping[str, int]  # how many flights ended so
     settled: int  # of them
-    medians: Mapping[str, float | None]  # of those that have the metric
+    medians: Mapping[str, float | None]  # of those that have the metric; of a yes/no metric the share that says yes
 
     @property
     def flights(self) -> int:
@@ -62,15 +62,19 @@ class _Group:
         self._outcomes: dict[str, int] = {}
         self._values: dict[str, list[float]] = {name: [] for name, m in METRICS.items() if m.in_short_tables}
 
-    def add(self, outcome: str, metrics: Mapping[str, float | None]) -> None:
+    def add(self, outcome: str, metrics: Mapping[str, float | bool | None]) -> None:
         self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1
         for name, values in self._values.items():
             if (value := metrics.get(name)) is not None:
                 values.append(value)
 
     def line(self, labels: tuple[str, ...]) -> Line:
-        medians = {name: statistics.median(values) if values else None for name, values in self._values.items()}
+        medians = {name: _typical(name, values) if values else None for name, values in self._values.items()}
         return Line(labels, self._outcomes, len(self._values["convergence_time_s"]), medians)
+
+
+def _typical(metric: str, values: Sequence[float]) -> float:
+    return statistics.fmean(values) if METRICS[metric].unit == YES_OR_NO else statistics.median(values)
 
 
 def _axes(matrix: Matrix) -> list[str]:
