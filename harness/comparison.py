@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -10,35 +9,15 @@ import pandas as pd
 from harness.error import did_you_mean
 from harness.margins import Assess
 from harness.metric import METRICS
-from harness.plants.ladder import BASELINE
 from harness.runs.results import load_results, mixed_versions
 from harness.runs.store import last_run
 from harness.settings import settings_from_text
-from harness.verdict import comparison as verdict
+from harness.verdict.comparison import Comparison, compare_flights
 from harness.verdict.pairs import CompareError, settings_of
-from harness.verdict.parts import PARTS, Part
-from harness.verdict.scorecard import IF
-from harness.verdict.words import answer
+
+__all__ = ["Comparison", "compare", "flights_and_margins"]
 
 _NEEDED = ("key", "outcome", "plant", "aircraft", "seed", "duration_s", "law.name", "law.standoff_m", *METRICS)
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """What flights say that differ in one setting alone, `by`.
-
-    - `answer`: text: does the assumption hold, what breaks first, what does it cost.
-    - `differences`: one row per metric, value of `by`, aircraft and law, with the columns `metric` (its unit is its
-      suffix), `value`, `aircraft`, `law`, `pairs`, `seeds`, `difference` (mean of the pairs, other minus baseline),
-      `low` and `high` (its 95 % interval over the seeds; NaN without one), `verdict` (holds, fails or undecided where
-      there is a margin; lower, higher or undecided without).
-    - `conditions`: the parts of the assumption that hold under a condition only: `metric`, `value`, `aircraft`,
-      `condition`.
-    """
-
-    answer: str
-    differences: pd.DataFrame
-    conditions: pd.DataFrame
 
 
 def compare(
@@ -52,8 +31,8 @@ def compare(
     """Pairs the flights that differ in the setting `by` alone, and says how their metrics differ.
 
     - `results`: a directory of `run`, or a DataFrame as `load_results` gives it.
-    - `by`: the setting, a column of the results; today the plant alone.
-    - `baseline`: its value that the others are compared with; None is the kinematic plant.
+    - `by`: the setting, a column of the results; single gains change with a law or its set, nothing else does.
+    - `baseline`: its value that the others are compared with; None is the kinematic plant, or the first value.
     - `where`: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
     - `assess`: the margins of the verdict; None: those that the run's settings say, of a DataFrame the defaults.
 
@@ -64,16 +43,14 @@ def compare(
     >>> comparison.differences.query("metric == 'range_error_rms_m'")
     """
     if isinstance(results, pd.DataFrame):
-        flights, margins = _checked(results), Assess()
+        flights, margins, question = _checked(results), Assess(), ""
     else:
         flights, margins = flights_and_margins(Path(results))
+        question = str(last_run(Path(results))["question"] or "")
     if by not in settings_of(flights):
         raise CompareError(_unknown("by", by, settings_of(flights)))
-    if by != "plant":
-        raise CompareError(f"by is {by!r}, only 'plant' can be compared so far")
     chosen = _chosen(flights, where or {})
-    compared = verdict.compare(chosen, assess or margins, BASELINE if baseline is None else str(baseline))
-    return Comparison("\n".join(answer(compared)), _differences(compared), _conditions(compared))
+    return compare_flights(chosen, assess or margins, by, baseline, question)
 
 
 def flights_and_margins(folder: Path, overrides: Sequence[str] = ()) -> tuple[pd.DataFrame, Assess]:
@@ -134,39 +111,3 @@ def _chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
 
 def _unknown(what: str, key: str, known: Sequence[str]) -> str:
     return f"{what}: no setting is called {key!r}{did_you_mean(key, known)}; the settings are {', '.join(known)}"
-
-
-def _differences(compared: verdict.Comparison) -> pd.DataFrame:
-    parts = {part.column: part for part in PARTS if part.bounds(compared.assess) != (None, None)}
-    rows = []
-    for row in compared.rows:
-        mean, low, high, pairs, seeds, _ = row.difference
-        word = _word(row, parts.get(row.metric), compared.assess)
-        rows.append((row.metric, row.plant, row.aircraft, row.law, pairs, seeds, mean, low, high, word))
-    columns = ["metric", "value", "aircraft", "law", "pairs", "seeds", "difference", "low", "high", "verdict"]
-    return pd.DataFrame(rows, columns=columns).astype({"low": float, "high": float})
-
-
-def _word(row: verdict.Row, part: Part | None, assess: Assess) -> str:
-    """The verdict that the 95 % interval of a difference allows; undecided without an interval."""
-    low, high = row.difference.low, row.difference.high
-    if low is None or high is None:
-        return "undecided"
-    if part is None:
-        return "higher" if low > 0.0 else "lower" if high < 0.0 else "undecided"
-    scale = row.reference if part.relative else 1.0
-    least, most = (None if bound is None else bound * scale for bound in part.bounds(assess))
-    if (least is None or low >= least) and (most is None or high <= most):
-        return "holds"
-    outside = (least is not None and high < least) or (most is not None and low > most)
-    return "fails" if outside else "undecided"
-
-
-def _conditions(compared: verdict.Comparison) -> pd.DataFrame:
-    rows = [
-        (finding.part.column, card.plant, card.aircraft, finding.condition)
-        for card in compared.scorecards
-        for finding in card.findings
-        if finding.verdict == IF
-    ]
-    return pd.DataFrame(rows, columns=["metric", "value", "aircraft", "condition"])

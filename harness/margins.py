@@ -1,8 +1,8 @@
 """The thresholds and margins of the verdict, the table [assess] of a file; each with where its default comes from.
 
 Sources: *Part 60*: 14 CFR Part 60, Appendices C and D, how closely a flight simulator must follow the aircraft it
-stands for. *ACS*: FAA-S-ACS-6, what a pilot's steep turn at 45 deg of bank is allowed. *Delay*: x' = -k x(t - tau)
-swings through zero as soon as k tau > 1/e, and grows beyond pi/2. *Ours*: a choice, with its reason.
+stands for. *ACS*: FAA-S-ACS-6, what a pilot's steep turn at 45 deg of bank is allowed. *Ours*: a choice, with its
+reason.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt, Lt
 
-from autopilot.quantities import About, Degrees, Metres, Seconds, Unit
+from autopilot.quantities import About, Degrees, Metres, Unit
 
 DegreesPerSecond2 = Annotated[float, Unit("deg_s2", math.pi / 180.0)]
 
@@ -24,12 +24,21 @@ class Assess:
         float, Gt(0), About("rms over nominal airspeed. Ours: 5 % of airspeed is 5 % of turn rate at the same bank")
     ] = 0.05
     heading_rate_gain: Annotated[
-        float, Gt(0), About("|flown over commanded - 1|. Ours: the 5 % asked of an identified inner loop")
+        float,
+        Gt(0),
+        About("|flown over commanded - 1| at low frequency. Ours: the 5 % asked of an identified inner loop"),
     ] = 0.05
-    heading_rate_lag: Annotated[Seconds, Gt(0), About("delay of the turn. The paper's sampling time (Table 1)")] = 0.5
-    lag_times_k2: Annotated[float, Gt(0), About("lag times reaching gain k2. Delay: 1/e, no oscillation below")] = (
-        1.0 / math.e
-    )
+    limit_cycle_margin: Annotated[
+        float,
+        Gt(0),
+        About(
+            "by what factor the gains may grow before a limit cycle begins. Ours: 1.5, so that a response "
+            "two thirds as quick as identified still has none"
+        ),
+    ] = 1.5
+    chatter_share: Annotated[
+        float, Ge(0), Lt(1), About("of the flights that show a limit cycle. Ours: as for lost flights")
+    ] = 0.05
     sideslip: Annotated[Degrees, Gt(0), About("rms. Part 60, adverse yaw: 2 deg of sideslip")] = math.radians(2.0)
     altitude_deviation: Annotated[Metres, Gt(0), About("peak. ACS: 100 ft, to the metre below")] = 30.0
     turn_ratio: Annotated[

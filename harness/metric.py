@@ -14,10 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+import aircraft
 from harness.feasibility import feasibility_margin
 from harness.log import FlightLog
+from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
-from harness.plants.turn import rate_of_turn
+from harness.plants.turn import bank_of_turn, rate_of_turn
 from harness.series import azimuth, overshoot, peak, rms, settling_time
 
 Array = NDArray[np.float64]
@@ -243,6 +245,14 @@ def _turn_ratio(signals: Signals) -> float | None:
     return float(coordinated @ log["heading_rate"] / (coordinated @ coordinated))
 
 
+def _bank_reserve(signals: Signals) -> float | None:
+    flight = signals.log.flight
+    if not PLANTS[flight.plant].banks:
+        return None
+    needed = bank_of_turn(flight.start.airspeed, flight.law.max_heading_rate)
+    return math.degrees(aircraft.limits(aircraft.folder(flight.aircraft)).bank - needed)
+
+
 def _averaged(x: Array, samples: float) -> Array:
     """A centred moving average: it delays nothing."""
     window = np.ones(max(1, round(samples)))
@@ -401,6 +411,13 @@ _METRICS = (
         heading="bank",
         statistic="peak",
         in_short_tables=True,
+    ),
+    Metric(
+        name="bank_reserve_deg",
+        unit="deg",
+        meaning="bank limit of the inner loop that flew, less the bank of a coordinated turn at the heading-rate limit",
+        measure=_bank_reserve,
+        heading="bank in reserve",
     ),
     Metric(
         name="sideslip_rms_deg",

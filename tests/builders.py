@@ -136,7 +136,7 @@ SETTINGS: Mapping[str, object] = {
 }  # fmt: skip
 QUIET: Mapping[str, float] = {
     **dict.fromkeys(METRICS, 0.0), "convergence_time_s": 40.0, "heading_rate_gain": 1.0, "turn_ratio": 1.0,
-    "heading_rate_lag_s": 0.001,
+    "heading_rate_lag_s": 0.001, "bank_reserve_deg": 30.0,
 }  # fmt: skip
 
 

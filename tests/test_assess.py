@@ -1,7 +1,6 @@
 """The margins of the verdict as a file sets them."""
 
 import math
-import re
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, get_args, get_origin, get_type_hints
@@ -11,9 +10,8 @@ import pytest
 from autopilot.quantities import About
 from harness.margins import Assess
 from harness.settings import SettingsError, load_flight, read_settings, settings_from_text
-from harness.settings.written import written
-from harness.verdict.parts import PARTS
-from tests.builders import DOCS, write
+from harness.verdict.parts import PARTS, margins_of
+from tests.builders import write
 
 FILE = """\
 [flight]
@@ -41,12 +39,10 @@ def test_a_margin_is_overridden_by_its_key(file: Path) -> None:
 
 
 def test_a_part_reads_its_margin_in_the_unit_of_the_file_which_is_that_of_its_metric() -> None:
-    part = next(part for part in PARTS if part.threshold == "sideslip_deg")
-    assert part.column == "sideslip_rms_deg"
-    low, high = part.bounds(Assess(sideslip=math.radians(3.0)))
+    low, high = PARTS["sideslip_rms_deg"].bounds(margins_of(Assess(sideslip=math.radians(3.0))))
     assert low is None
     assert high == pytest.approx(3.0)
-    assert {part.threshold for part in PARTS} <= set(written(Assess()))
+    assert {part.margin for part in PARTS.values()} <= set(margins_of(Assess()))
 
 
 def test_margins_are_read_though_the_flight_beside_them_is_unknown_today() -> None:
@@ -79,14 +75,3 @@ def test_every_margin_says_what_it_means_and_where_it_comes_from() -> None:
         assert get_origin(hint) is Annotated
         (about,) = [mark.text for mark in get_args(hint) if isinstance(mark, About)]
         assert any(source in about for source in ("Ours:", "Part 60", "ACS", "Delay", "Table 1", "Holm")), field.name
-
-
-def test_the_document_has_every_margin_with_its_default() -> None:
-    text = (DOCS / "reference" / "verdict.md").read_text(encoding="utf-8")
-    rows = {row.split("|")[3].strip(" `"): row.split("|")[4] for row in text.splitlines() if row.count("|") == 6}
-    for key, default in written(Assess()).items():
-        assert key in rows, key
-        number = re.search(r"1/e|[\d.]+", rows[key])
-        assert number, key
-        told = 1.0 / math.e if number[0] == "1/e" else float(number[0])
-        assert told / (100.0 if "%" in rows[key] else 1.0) == pytest.approx(default), key

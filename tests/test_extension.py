@@ -233,5 +233,5 @@ def test_a_matrix_over_them_is_flown_kept_shown_and_compared(tree: Path) -> None
     assert "ends_north" in harness(tree, "show", f"out:{done.stdout.split()[-1]}")
     compared = json.loads(harness(tree, "compare", "out", "--json"))
     assert compared["assess"]["shyness_deg"] == 3.0
-    assert {row["plant"] for row in compared["differences"]} == {"weak"}
+    assert {row["value"] for row in compared["differences"]} == {"weak"}
     assert {"distance_flown_m", "ends_north"} <= {row["metric"] for row in compared["differences"]}

@@ -188,7 +188,7 @@ def test_what_a_plant_does_not_have_is_none() -> None:
     missing = {name for name, value in judged.items() if value is None}
     assert missing == {
         "overshoot_m", "heading_rate_lag_s", "heading_rate_gain", "turn_ratio", "sideslip_rms_deg", "sideslip_peak_deg",
-        "bank_peak_deg", "lateral_acceleration_rms_mps2",
+        "bank_peak_deg", "bank_reserve_deg", "lateral_acceleration_rms_mps2",
     }  # fmt: skip
 
 

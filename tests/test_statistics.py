@@ -1,102 +1,110 @@
-"""What pairs say, against textbook values, other implementations and flights of chance."""
+"""The statistics against closed forms, and against drawn samples whose truth is known."""
+
+import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
-from harness.verdict.statistics import LEAST_SEEDS, effect, equivalence, holm, mcnemar, share
+from harness.verdict.statistics import LEAST_EQUAL, LEAST_SEEDS, Sample, evidence, holm, sample, seeds_to_decide, share
 
-RNG = np.random.default_rng(7)
-
-
-def test_holm_gives_the_known_values_whatever_the_order() -> None:
-    assert holm([0.01, 0.02, 0.03, 0.5]) == pytest.approx([0.04, 0.06, 0.06, 0.5])
-    assert holm([0.5, 0.03, 0.01, 0.02]) == pytest.approx([0.5, 0.06, 0.04, 0.06])
-    assert holm([0.9, 0.8]) == [1.0, 1.0]
-    assert holm([]) == []
+Array = NDArray[np.float64]
 
 
-def test_mcnemar_is_exact() -> None:
-    assert mcnemar(2, 9) == pytest.approx(0.0654, abs=5e-5)
-    assert mcnemar(0, 0) == 1.0
-    assert mcnemar(5, 0) == pytest.approx(2 * 0.5**5)
+def drawn(values: Array) -> Sample:
+    return Sample(np.asarray(values, float), len(values), drawn=True)
 
 
-def test_wilsons_interval_is_known() -> None:
-    """Wilson (1927): 0 of 10 reaches up to z^2/(n + z^2)."""
-    z2 = stats.norm.ppf(0.975) ** 2
-    none = share(0, 10)
-    assert none.low == 0.0
-    assert none.high == pytest.approx(z2 / (10 + z2))
-    assert share(10, 10).low == pytest.approx(1.0 - none.high)
+SYMMETRIC = drawn(np.array([-2.0, -1.0, 0.0, 1.0, 2.0]))
+SKEWED = drawn(np.array([0.1, 0.2, 0.2, 0.3, 0.5, 0.9, 2.5]))
 
 
-def test_equivalence_is_two_one_sided_t_tests() -> None:
-    d = RNG.normal(0.1, 0.5, 20)
-    low = stats.ttest_1samp(d, -0.5, alternative="greater").pvalue
-    high = stats.ttest_1samp(d, 0.5, alternative="less").pvalue
-    assert equivalence(d + 0.5, d - 0.5) == pytest.approx(max(low, high))
-    assert equivalence(d[:0], d - 0.5) == pytest.approx(high)
+def test_without_skewness_the_interval_is_students_with_half_of_the_degrees_of_freedom() -> None:
+    expected = stats.t.interval(0.95, 2, 0.0, math.sqrt(2.5 / 5.0))
+    assert SYMMETRIC.interval() == pytest.approx(expected)
+    assert SYMMETRIC.p_above(-1.0) == pytest.approx(stats.t.sf(1.0 / math.sqrt(2.5 / 5.0), 2))
 
 
-def test_no_significant_difference_is_no_equivalence() -> None:
-    """Three scattered differences around zero: no difference is found, and no equivalence either."""
-    d = np.array([-3.0, 0.1, 3.0])
-    assert stats.ttest_1samp(d, 0.0).pvalue > 0.9
-    p = equivalence(d + 1.0, d - 1.0)
-    assert p is not None
-    assert p > 0.2
+def test_skewness_widens_the_interval_on_its_own_side_only() -> None:
+    low, high = SKEWED.interval() or (0.0, 0.0)
+    student = stats.t.interval(0.95, 3, SKEWED.mean, stats.sem(SKEWED.means))
+    assert low == pytest.approx(student[0])
+    assert high > student[1] + 0.5
 
 
-def test_without_variation_there_is_nothing_to_test() -> None:
-    assert equivalence(np.array([1.0, 1.0]), np.array([-1.0, -1.0])) is None
-    assert equivalence(np.array([1.0]), np.array([-1.0])) is None
+def test_an_interval_ends_where_the_test_at_its_level_begins() -> None:
+    for of in (SYMMETRIC, SKEWED):
+        low, high = of.interval() or (0.0, 0.0)
+        assert of.p_above(low) == pytest.approx(0.025)
+        assert of.p_below(high) == pytest.approx(0.025)
 
 
-@pytest.mark.parametrize(
-    ("values", "seeds", "why"),
-    [
-        ([3.0], [0], "one seed"),
-        ([3.0, 4.0], [0, 0], "one seed"),
-        ([3.0] * 6, range(6), "no variation"),
-        ([1.0, 2.0], [0, 1], "too few"),
-    ],
-)
-def test_a_population_without_variation_has_a_difference_and_no_interval(
-    values: list[float], seeds: list[int], why: str
-) -> None:
-    found = effect(np.array(values), list(seeds), "test")
-    assert found.mean == pytest.approx(np.mean(values))
-    assert found.low is found.high is None
-    assert why in found.why
+def test_a_mirrored_sample_has_the_mirrored_interval() -> None:
+    low, high = SKEWED.interval() or (0.0, 0.0)
+    assert drawn(-SKEWED.means).interval() == pytest.approx((-high, -low))
 
 
-def test_an_interval_is_the_same_each_time() -> None:
-    values = RNG.exponential(1.0, 20)
-    assert effect(values, range(20), "a") == effect(values, range(20), "a")
-    assert effect(values, range(20), "a") != effect(values, range(20), "b")
+def test_flights_of_one_seed_are_one_draw() -> None:
+    seeds = np.repeat(np.arange(6), 4)
+    values = np.repeat([1.0, 2.0, 3.0, 4.0, 5.0, 7.0], 4)
+    of = sample(values, seeds, drawn=True)
+    assert (of.pairs, of.seeds) == (24, 6)
+    assert of.interval() == drawn(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 7.0])).interval()
+    values[:2] = math.nan
+    assert sample(values, seeds, drawn=True).pairs == 22
 
 
-def test_flights_of_one_seed_count_once() -> None:
-    """Ten copies of every flight bring no knowledge: the interval stays as wide."""
-    values = RNG.normal(0.0, 1.0, 12)
-    once = effect(values, range(12), "copies")
-    tenfold = effect(np.repeat(values, 10), np.repeat(np.arange(12), 10), "copies")
-    assert tenfold[:3] == pytest.approx(once[:3])
-    assert (tenfold.pairs, tenfold.seeds) == (120, 12)
+def test_too_few_seeds_have_no_interval_and_say_how_many_are_needed() -> None:
+    few = drawn(np.arange(LEAST_SEEDS - 1.0))
+    assert few.interval() is None
+    assert few.why_not == "4 seeds; 5 are needed"
+    assert evidence(few, -100.0, 100.0).strongest == 1.0
 
 
-def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
-    """20 skewed differences (exponential, mean 1), 300 times over: BCa is known to fall short by a few percent."""
-    rng = np.random.default_rng(1)
-    hits = 0
-    for i in range(300):
-        found = effect(rng.exponential(1.0, 20), range(20), f"coverage {i}")
-        assert found.low is not None
-        assert found.high is not None
-        hits += found.low <= 1.0 <= found.high
-    assert 0.88 <= hits / 300 <= 0.98
+def test_what_is_not_drawn_is_a_number_and_what_is_drawn_needs_fourteen_that_agree() -> None:
+    exact = Sample(np.array([1.5]), 1, drawn=False)
+    assert exact.interval() == (1.5, 1.5)
+    assert evidence(exact, -2.0, 2.0) == (0.0, 1.0)
+    assert evidence(exact, -1.0, 1.0) == (1.0, 0.0)
+    assert drawn(np.full(LEAST_EQUAL - 1, 1.5)).interval() is None
+    assert drawn(np.full(LEAST_EQUAL, 1.5)).interval() == (1.5, 1.5)
+    assert 1.0 - 0.05 ** (1.0 / LEAST_EQUAL) < 0.2 < 1.0 - 0.05 ** (1.0 / (LEAST_EQUAL - 1))
 
 
-def test_enough_seeds_give_an_interval() -> None:
-    assert effect(RNG.normal(size=LEAST_SEEDS), range(LEAST_SEEDS), "few").low is not None
+def test_evidence_is_for_the_side_on_which_the_interval_lies() -> None:
+    assert evidence(SYMMETRIC, -10.0, 10.0).holds < 0.05 < evidence(SYMMETRIC, -10.0, 10.0).fails
+    assert evidence(SYMMETRIC, 10.0, None).fails < 0.05
+    assert evidence(SYMMETRIC, -1.0, 1.0).strongest > 0.05
+    moving = np.array([0.5, 1.0, 1.5, 2.0, 2.5])  # a bound for each seed
+    assert evidence(SYMMETRIC, None, moving).holds == pytest.approx(2.0 * drawn(SYMMETRIC.means - moving).p_below(0.0))
+
+
+def test_holm_is_the_textbooks() -> None:
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+
+
+def test_as_many_seeds_as_advised_decide_when_mean_and_scatter_stay() -> None:
+    of = drawn(np.array([0.4, 1.2, 0.9, 1.6, 0.7, 1.1]))
+    assert evidence(of, None, 1.3).strongest > 0.05
+    needed = seeds_to_decide(of, None, 1.3, 0.05)
+    assert needed is not None
+    spread = np.std(of.means, ddof=1)
+    for n, decided in ((needed + 1, True), (max(7, round(0.8 * needed)), False)):
+        half = stats.t.ppf(0.975, 0.5 * (n - 1)) * spread / math.sqrt(n)
+        assert bool(of.mean + half <= 1.3) is decided
+    assert seeds_to_decide(of, None, of.mean, 0.05) is None
+
+
+def test_a_share_of_alike_flights_is_as_uncertain_as_that_of_their_seeds() -> None:
+    """Twenty seeds, each with five flights that all converge or all do not: twenty draws, not a hundred."""
+    by_seed = np.arange(20) < 8
+    alike = share(np.repeat(by_seed, 5), np.repeat(np.arange(20), 5), drawn=True)
+    expected = stats.binomtest(8, 20).proportion_ci(0.95, "exact")
+    assert (alike.number, alike.of, alike.seeds) == (40, 100, 20)
+    assert (alike.low, alike.high) == pytest.approx((expected.low, expected.high), abs=0.02)
+    mixed = np.tile(np.arange(5) < 2, 20)
+    wide = share(mixed, np.repeat(np.arange(20), 5), drawn=True)
+    assert wide.high - wide.low <= alike.high - alike.low
+    none = share(np.zeros(100, bool), np.repeat(np.arange(20), 5), drawn=True)
+    assert (none.low, none.high) == pytest.approx((0.0, 1.0 - 0.025 ** (1.0 / 20.0)))

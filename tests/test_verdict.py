@@ -1,9 +1,8 @@
-"""Pairs and scorecard: made-up flights whose answer is known."""
+"""Pairs, words and conditions: made-up flights whose answer is known."""
 
-import itertools
 import math
 from collections.abc import Mapping
-from typing import Any
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -12,85 +11,85 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.margins import Assess
-from harness.verdict.attribution import attributions
-from harness.verdict.comparison import Comparison, compare
-from harness.verdict.pairs import CompareError, axes, entered, plant_pairs, spread
-from harness.verdict.scorecard import HOLDS, IF, NOT, UNSHOWN, Cell, conclusion
-from harness.verdict.words import answer, breaks_first, lines
+from harness.verdict.comparison import Comparison, Scorecard, compare_flights
+from harness.verdict.conditions import conclude
+from harness.verdict.judgement import Judgement
+from harness.verdict.pairs import CompareError, axes, entered, pairs_by, spread
+from harness.verdict.statistics import LEAST_EQUAL
+from harness.verdict.text import lines
+from harness.vocabulary import Verdict
 from tests.builders import QUIET, SEEDS, result, result_matrix, results, shifted
+
+
+def compared(flights: pd.DataFrame) -> Comparison:
+    return compare_flights(flights, Assess())
+
+
+def card_of(flights: pd.DataFrame) -> Scorecard:
+    (card,) = compared(flights).scorecards
+    return card
+
 
 # Pairs
 
 
 def test_flights_that_differ_in_the_plant_alone_are_pairs_whatever_their_order() -> None:
-    flights = result_matrix({"guidance_period_s": [0.05, 0.5]}).sample(frac=1.0, random_state=1)
-    paired = plant_pairs(flights, "kinematic")
+    flights = entered(result_matrix({"guidance_period_s": [0.05, 0.5]}), 0.25).sample(frac=1.0, random_state=1)
+    paired = pairs_by(flights, "plant", "kinematic")
     assert len(paired) == 2 * SEEDS
     assert not len(paired.unpaired)
     for column in ("seed", "guidance_period_s", "start.heading_deg"):
         assert list(paired.reference[column]) == list(paired.other[column])
 
 
+def test_a_new_column_of_results_breaks_no_pair() -> None:
+    flights = result_matrix()
+    flights["fuel_used_kg"] = np.arange(len(flights), dtype=float)
+    assert len(compared(flights).pairs) == SEEDS
+
+
 def test_a_flight_without_partner_and_a_failed_one_are_listed_with_what_they_are_set_to() -> None:
     flights = result_matrix()
     flights = flights.drop(index=flights.index[(flights["plant"] == "kinematic") & (flights["seed"] == 3)])
     flights.loc[(flights["plant"] == "sixdof") & (flights["seed"] == 5), "outcome"] = "worker_died"
-    found = compare(flights, Assess())
+    found = compared(flights)
     assert len(found.pairs) == SEEDS - 2
-    assert {left.settings["seed"] for left in found.unpaired} == {3, 5}
-    assert len(found.unpaired) == 2
-    (failed,) = found.failed
-    assert (failed.outcome, failed.settings["seed"]) == ("worker_died", 5)
-    text = "\n".join(lines(found))
-    assert "2 flights without a partner:" in text
-    assert "1 flight in no pair, since failed:" in text
+    without = [flight for flight in found.unpaired if flight.why == "without a partner"]
+    failed = [flight for flight in found.unpaired if flight.why == "failed"]
+    assert [flight.settings["seed"] for flight in without] == [5, 3]
+    assert [(flight.outcome, flight.settings["seed"]) for flight in failed] == [("worker_died", 5)]
+    assert "3 flights could not be compared:" in "\n".join(lines(found))
 
 
 @pytest.mark.parametrize(
-    ("flights", "told"),
+    ("flights", "message"),
     [
         (results([result("sixdof")]), "1 flight in all: a comparison takes at least two"),
-        (results([result("sixdof", 0), result("sixdof", 1)]), "no flight has the baseline's plant, 'kinematic'"),
-        (results([result("kinematic", 0), result("kinematic", 1)]), "all 2 flights have plant 'kinematic'"),
+        (
+            results([result("sixdof", 0), result("sixdof", 1)]),
+            "no flight has the baseline, plant = kinematic: there is",
+        ),
+        (results([result("kinematic", 0), result("kinematic", 1)]), "all 2 flights have plant = kinematic"),
         (
             results([result("kinematic"), result("sixdof", settings={"aircraft": "skywalker_x8"})]),
-            "differs from the nearest of 'kinematic' in aircraft too",
+            "differs from the nearest of the baseline in aircraft too",
         ),
         (
             results([result("kinematic"), {**result("sixdof"), "outcome": "timeout"}]),
-            "no flight of plant 'kinematic', or none of another, ended in a result",
+            "no flight with the baseline's plant, or none with another, ended in a result",
         ),
     ],
 )
-def test_what_is_missing_for_a_comparison_is_said(flights: pd.DataFrame, told: str) -> None:
-    with pytest.raises(CompareError) as raised:
-        plant_pairs(flights, "kinematic")
-    assert told in str(raised.value)
+def test_what_is_missing_for_a_comparison_is_said(flights: pd.DataFrame, message: str) -> None:
+    with pytest.raises(CompareError, match=message):
+        compared(flights)
 
 
-def test_a_lost_flight_enters_with_the_worst_and_an_unconverged_one_with_its_duration() -> None:
-    lost = {**QUIET, "convergence_time_s": 20.0, "range_error_rms_m": 3.0, "turn_ratio": 0.99}
-    rows = [
-        result("kinematic", 0),
-        result("sixdof", 0, {**QUIET, "convergence_time_s": math.nan, "range_error_rms_m": 50.0, "turn_ratio": 0.8}),
-        {**result("sixdof", 1, lost), "outcome": "departed"},
-    ]
-    table_ = entered(results(rows), 0.25)
-    assert list(table_["convergence_time_s"]) == [40.0, 100.0, 100.0]
-    assert list(table_["converged"]) == [True, False, False]
-    gone = table_.loc[2]
-    assert gone["range_error_rms_m"] == 50.0
-    assert gone["saturation_fraction"] == 1.0
-    assert gone["turn_ratio"] == 0.8
-
-
-def test_a_lost_flight_gets_no_metric_that_its_plant_does_not_have() -> None:
-    without = {**QUIET, "sideslip_rms_deg": math.nan}
-    rows = [
-        {**result("kinematic", 0, without), "outcome": "target_lost"},
-        result("sixdof", 0, {**QUIET, "sideslip_rms_deg": 9.0}),
-    ]
-    assert math.isnan(entered(results(rows), 0.25)["sideslip_rms_deg"][0])
+def test_a_lost_flight_is_no_data_and_has_no_convergence_time() -> None:
+    table = entered(results([result("kinematic"), {**result("sixdof"), "outcome": "departed"}]), 0.25)
+    last = table.iloc[1]
+    assert (last["lost"], last["converged"]) == (1.0, 0.0)
+    assert all(math.isnan(last[name]) for name in QUIET if name in table)
 
 
 def test_what_is_set_is_an_axis_and_what_is_drawn_or_follows_is_none() -> None:
@@ -99,234 +98,217 @@ def test_what_is_set_is_an_axis_and_what_is_drawn_or_follows_is_none() -> None:
     speed = flights["law.max_heading_rate_deg_s"].map({5.0: 0.0, 20.0: 4.0})
     angle = np.radians(30.0 * flights["seed"])
     flights["wind.steady_mps"] = list(zip(speed * np.cos(angle), speed * np.sin(angle), strict=True))
-    assert axes(spread(flights)) == {
+    assert axes(spread(flights), ("plant",)) == {
         "law": ["smc paper", "smc paper_1"],
         "law.max_heading_rate_deg_s": [5.0, 20.0],
     }  # the wind's speed follows the limit, its direction and the heading are drawn
     severities = result_matrix({"wind.turbulence": ["severe", "none", "moderate"]})
-    assert axes(severities) == {"wind.turbulence": ["none", "moderate", "severe"]}
+    assert axes(spread(severities), ("plant",)) == {"wind.turbulence": ["none", "moderate", "severe"]}
 
 
-# The scorecard
+# Words
 
 
-def cells(passing: Mapping[tuple[Any, ...], bool], names: tuple[str, ...], beyond: bool = True) -> list[Cell]:
-    bounds = (None, 1.0)
-    return [
-        Cell(dict(zip(names, at, strict=True)), 5, 0.5 if ok or not beyond else 2.0, bounds, 0.01, 0, False, ok)
-        for at, ok in passing.items()
-    ]
-
-
-LIMITS: dict[str, list[object]] = {"limit": [5.0, 10.0, 20.0]}
-
-
-@pytest.mark.parametrize(
-    ("passing", "verdict", "condition"),
-    [
-        ([True, True, True], HOLDS, ""),
-        ([True, True, False], IF, "limit <= 10"),
-        ([True, False, False], IF, "limit <= 5"),
-        ([False, True, True], IF, "limit >= 10"),
-        ([False, True, False], IF, "limit = 10"),
-        ([True, False, True], IF, "limit <= 5"),
-        ([False, False, False], NOT, ""),
-    ],
-)
-def test_holds_if_is_the_largest_interval_in_which_every_cell_passes(
-    passing: list[bool], verdict: str, condition: str
-) -> None:
-    at = {(value,): ok for value, ok in zip(LIMITS["limit"], passing, strict=True)}
-    assert conclusion(cells(at, ("limit",)), LIMITS) == (verdict, condition)
-
-
-def test_an_inner_interval_has_two_ends() -> None:
-    across: dict[str, list[object]] = {"limit": [1.0, 2.0, 3.0, 4.0, 5.0]}
-    at = {(v,): v in (2.0, 3.0, 4.0) for v in across["limit"]}
-    assert conclusion(cells(at, ("limit",)), across) == (IF, "2 <= limit <= 4")
-
-
-def test_one_failing_cell_bars_a_value_and_the_axis_that_saves_most_cells_is_named() -> None:
-    across: dict[str, list[object]] = {**LIMITS, "law": ["a", "b"]}
-    at = {(limit, law): law == "a" or limit == 5.0 for limit in LIMITS["limit"] for law in ("a", "b")}
-    assert conclusion(cells(at, ("limit", "law")), across) == (IF, "law is a")
-    at[(10.0, "a")] = False
-    assert conclusion(cells(at, ("limit", "law")), across) == (IF, "limit <= 5")
-    at[(5.0, "b")] = False
-    assert conclusion(cells(at, ("limit", "law")), across) == (NOT, "")
-
-
-@given(passing=st.lists(st.booleans(), min_size=1, max_size=7))
-def test_no_stretch_that_passes_is_longer_than_the_one_named(passing: list[bool]) -> None:
-    values: list[object] = [float(i) for i in range(len(passing))]
-    at = {(value,): ok for value, ok in zip(values, passing, strict=True)}
-    verdict, condition = conclusion(cells(at, ("x",)), {"x": values})
-    longest = max((len(list(run)) for ok, run in itertools.groupby(passing) if ok), default=0)
-    assert verdict == (HOLDS if all(passing) else IF if longest else NOT)
-    if verdict == IF:
-        python = condition if {"<", ">"} & set(condition) else condition.replace("=", "==")
-        named = [ok for value, ok in zip(values, passing, strict=True) if eval(python, {"x": value})]
-        assert named == [True] * longest
-
-
-def test_severities_have_an_order_and_words_have_none() -> None:
-    across: dict[str, list[object]] = {"turbulence": ["none", "light", "moderate"]}
-    at = {("none",): True, ("light",): True, ("moderate",): False}
-    assert conclusion(cells(at, ("turbulence",)), across) == (IF, "turbulence <= light")
-    words: dict[str, list[object]] = {"law": ["a", "b", "c"]}
-    assert conclusion(cells({("a",): True, ("b",): False, ("c",): True}, ("law",)), words) == (IF, "law is a or c")
-
-
-def test_a_condition_says_at_what_else_alone_its_cells_were_flown() -> None:
-    """Radii were flown at the highest limit, the long period at the lowest and in still air."""
-    names = ("limit", "radius", "period", "wind_speed_mps")
-    at = {
-        (5.0, 200.0, 0.05, 0.0): False, (5.0, 200.0, 0.2, 0.0): True, (5.0, 200.0, 0.05, 2.0): False,
-        (20.0, 200.0, 0.05, 2.0): False, (20.0, 60.0, 0.05, 0.0): False,
-    }  # fmt: skip
-    across = {name: list[object](sorted({v[i] for v in at})) for i, name in enumerate(names)}
-    assert conclusion(cells(at, names), across) == (
-        IF,
-        "period >= 0.2, flown only at limit = 5, radius = 200, undisturbed",
+def test_equal_plants_differ_in_nothing_and_enough_equal_seeds_hold() -> None:
+    flights = result_matrix()
+    card = card_of(flights)
+    drawn = [judgement for judgement in card.judgements if judgement.column != "bank_reserve_deg"]
+    assert {judgement.word for judgement in drawn} == {Verdict.UNDECIDED}  # 12 seeds that agree are too few
+    more = pd.concat([flights, flights.assign(seed=flights["seed"] + SEEDS, key=flights["key"] + "b")])
+    more["start.heading_deg"] = 30.0 + more["seed"]
+    assert 2 * SEEDS >= LEAST_EQUAL
+    assert {part.title: card_of(more).conclusion(part.column).word for part in card_of(more).parts} == dict.fromkeys(
+        [part.title for part in card.parts], Verdict.HOLDS
     )
 
 
-def test_undecided_cells_alone_do_not_refute() -> None:
-    at = {(value,): False for value in LIMITS["limit"]}
-    assert conclusion(cells(at, ("limit",), beyond=False), LIMITS) == (UNSHOWN, "")
+def test_a_word_needs_evidence_in_its_direction() -> None:
+    for by, scatter, word in ((1.0, 0.2, HOLD), (1.0, 3.0, OPEN), (4.0, 0.2, FAIL)):
+        (judgement,) = card_of(shifted(result_matrix(), "range_error_rms_m", by, scatter=scatter)).of(
+            "range_error_rms_m"
+        )
+        assert judgement.word == word
+        assert (judgement.seeds_needed is not None) is (word == OPEN)
 
 
-def found(flights: pd.DataFrame) -> Comparison:
-    return compare(flights, Assess())
+def test_without_draws_one_flight_is_a_number() -> None:
+    flights = result_matrix()
+    flights["start.heading_deg"] = 30.0
+    one = shifted(flights[flights["seed"] == 0].copy(), "sideslip_rms_deg", 1.0, scatter=0.0)
+    (judgement,) = card_of(one).of("sideslip_rms_deg")
+    assert (judgement.word, judgement.low, judgement.high, judgement.seeds) == (Verdict.HOLDS, 1.0, 1.0, 1)
 
 
-def test_equal_plants_hold_in_every_part() -> None:
-    (card,) = found(result_matrix()).scorecards
-    assert {finding.verdict for finding in card.findings} == {HOLDS, "not measured"}  # SMC has no k2
-    assert breaks_first(card) is None
+def test_one_seed_of_turbulence_shows_nothing() -> None:
+    flights = result_matrix({"wind.turbulence": ["moderate"]})
+    (judgement,) = card_of(flights[flights["seed"] == 0]).of("sideslip_rms_deg")
+    assert (judgement.word, judgement.why) == (Verdict.UNDECIDED, "1 seed; 5 are needed")
 
 
-def test_a_part_holds_if_the_limit_is_low_enough() -> None:
-    flights = result_matrix({"law.max_heading_rate_deg_s": [5.0, 10.0, 20.0]})
-    for limit, sideslip in ((5.0, 0.5), (10.0, 1.5), (20.0, 4.0)):
-        flights = shifted(flights, "sideslip_rms_deg", sideslip, where={"law.max_heading_rate_deg_s": limit})
-    (card,) = found(flights).scorecards
-    sideslip_found = card.finding("sideslip")
-    assert (sideslip_found.verdict, sideslip_found.condition) == (IF, "law.max_heading_rate_deg_s <= 10")
-    assert sideslip_found.effect.mean == pytest.approx(2.0, abs=0.05)
-    assert (sideslip_found.passed, sideslip_found.effect.pairs, sideslip_found.effect.seeds) == (2, 3 * SEEDS, SEEDS)
-    assert sideslip_found.worst is not None
-    assert sideslip_found.worst.at == {"law.max_heading_rate_deg_s": 20.0}
-    assert breaks_first(card) is sideslip_found
-    said = answer(found(flights))
-    assert len(said) == 3
-    assert said[1].startswith("What breaks first? Zero sideslip fails on ultra_stick_25e in 1 of 3 cells (at worst +4")
-    assert said[1].endswith(
-        "not if law.max_heading_rate_deg_s <= 10), where at most 2 is asked, furthest out on ultra_stick_25e at "
-        "law.max_heading_rate_deg_s = 20."
-    )
-
-
-def test_a_difference_within_the_margin_that_scatters_too_much_is_not_shown() -> None:
-    (card,) = found(shifted(result_matrix(), "range_error_rms_m", 1.0, scatter=5.0)).scorecards
-    assert card.finding("settled_error").verdict == UNSHOWN
-    assert breaks_first(card) is None  # what is not shown is not broken
-    (card,) = found(shifted(result_matrix(), "range_error_rms_m", 1.0, scatter=0.5)).scorecards
-    assert card.finding("settled_error").verdict == HOLDS
-
-
-def test_holm_makes_a_lonely_test_harder_in_company() -> None:
-    """Ten cells of one part, and ten of another that are less clear: the same p-value counts twenty times."""
-    few = shifted(result_matrix(), "range_error_rms_m", 1.5, scatter=0.5)
-    (card,) = found(few).scorecards
-    alone = card.finding("settled_error").cells[0].p
-    many = result_matrix({"guidance_period_s": [0.05 + 0.05 * i for i in range(10)]})
-    many = shifted(shifted(many, "range_error_rms_m", 1.5, scatter=0.5), "sideslip_rms_deg", 1.9, scatter=0.4)
-    (card,) = found(many).scorecards
-    company = card.finding("settled_error").cells[0].p
-    assert alone is not None
-    assert company is not None
-    assert 0.001 < alone < 0.05
-    assert company == pytest.approx(20 * alone)
-
-
-def test_lost_flights_count_against_every_part_of_their_cell() -> None:
-    flights = result_matrix({"wind.turbulence": ["none", "severe"]})
+def test_lost_flights_count_against_their_cell_and_never_as_data() -> None:
+    flights = shifted(result_matrix({"wind.turbulence": ["none", "severe"]}), "range_error_rms_m", 0.5, scatter=0.1)
     lost = (flights["plant"] == "sixdof") & (flights["wind.turbulence"] == "severe") & (flights["seed"] < 3)
     flights.loc[lost, "outcome"] = "departed"
-    (card,) = found(flights).scorecards
-    assert card.lost.number == 3
-    assert (card.finding("alive").verdict, card.finding("alive").condition) == (IF, "wind.turbulence is none")
-    for finding in card.findings:
-        if finding.cells and finding.part.name != "reach":  # that one is about settings
-            assert (finding.verdict, finding.condition) == (IF, "wind.turbulence is none"), finding.part.name
-    assert card.finding("convergence_time").effect.pairs == 2 * SEEDS
+    flights.loc[lost, "range_error_rms_m"] = 999.0
+    card = card_of(flights)
+    assert (card.lost.number, card.lost.of) == (3, 2 * SEEDS)
+    calm, severe = card.of("range_error_rms_m")
+    assert (calm.word, severe.word) == (Verdict.HOLDS, Verdict.UNDECIDED)
+    assert severe.why == "3 of 12 flights ended early"
+    assert severe.difference == pytest.approx(0.5, abs=0.2)
+    text = "\n".join(lines(compared(flights)))
+    assert "3 of 24 flights with plant = sixdof ended early." in text
 
 
-def test_convergence_is_compared_by_who_converges_alone() -> None:
+def test_flights_lost_on_both_plants_are_told_of_both_before_anything_else() -> None:
     flights = result_matrix()
-    never = (flights["plant"] == "sixdof") & (flights["seed"] < 6)
-    flights.loc[never, "convergence_time_s"] = np.nan
-    (card,) = found(flights).scorecards
-    assert card.alone == (6, 0)
-    assert card.convergence_p == pytest.approx(2 * 0.5**6)
-    assert card.finding("convergence").verdict == NOT
-    assert card.finding("convergence_time").effect.mean == pytest.approx(0.5 * 60.0)  # censored at 100 s
+    flights["outcome"] = "target_lost"
+    answer = compared(flights).answer
+    assert "12 of 12 flights with plant = kinematic ended early." in answer
+    assert "12 of 12 flights with plant = sixdof ended early." in answer
+    assert "constant airspeed" not in answer
 
 
-def test_where_neither_converges_the_time_says_nothing() -> None:
-    flights = result_matrix()
-    flights.loc[flights["seed"] < 6, "convergence_time_s"] = np.nan
-    (card,) = found(flights).scorecards
-    assert card.finding("convergence_time").effect.pairs == SEEDS - 6
-    assert card.finding("convergence").verdict == HOLDS
+def test_a_convergence_time_is_of_pairs_that_both_converge_and_holds_only_where_all_do() -> None:
+    flights = shifted(result_matrix(), "convergence_time_s", 1.0, scatter=0.1)
+    (judgement,) = card_of(flights).of("convergence_time_s")
+    assert (judgement.word, judgement.pairs) == (Verdict.HOLDS, SEEDS)
+    flights.loc[(flights["plant"] == "sixdof") & (flights["seed"] < 2), "convergence_time_s"] = math.nan
+    (judgement,) = card_of(flights).of("convergence_time_s")
+    assert (judgement.word, judgement.pairs) == (Verdict.UNDECIDED, SEEDS - 2)
+    assert judgement.why == "in 2 pairs only the reference converges, in 0 only the other"
+    assert judgement.difference == pytest.approx(1.0, abs=0.2)  # not the 60 s at which the flights end
 
 
 def test_where_the_law_does_not_circle_on_the_baseline_the_cost_says_nothing() -> None:
-    """Half of the seeds fly away on every plant, each to somewhere else; the assumption's own parts count there too."""
     flights = shifted(result_matrix(), "range_error_rms_m", 1.0)
     away = flights["seed"] < 6
     flights.loc[away, "range_error_rms_m"] = 51.0 + 100.0 * (flights["plant"] == "sixdof")
-    flights.loc[away, "convergence_time_s"] = np.nan
-    (card,) = found(flights).scorecards
-    assert card.finding("settled_error").effect.pairs == SEEDS - 6
-    assert card.finding("settled_error").effect.mean == pytest.approx(1.0, abs=0.02)
-    assert card.finding("sideslip").effect.pairs == SEEDS
-    assert card.converged[0].of == SEEDS
-    (one,) = attributions(entered(flights, 0.25))
-    assert one.scenarios == SEEDS - 6
-    assert "6 of the pairs say nothing of the cost: the law does not circle" in "\n".join(lines(found(flights)))
-    flights.loc[away & (flights["plant"] == "kinematic"), "range_error_rms_m"] = 50.0  # a quarter of the 200 m
-    (card,) = found(flights).scorecards
-    assert card.finding("settled_error").effect.pairs == SEEDS  # one that leaves the circle of the baseline costs
+    (error,) = card_of(flights).of("range_error_rms_m")
+    (sideslip,) = card_of(flights).of("sideslip_rms_deg")
+    assert (error.pairs, sideslip.pairs) == (SEEDS - 6, SEEDS)
+    assert error.difference == pytest.approx(1.0, abs=0.02)
 
 
-def test_where_no_flight_converges_convergence_is_not_measured() -> None:
-    flights = result_matrix({"law.name": ["smc", "nftsm"]})
-    flights.loc[flights["law.name"] == "smc", "convergence_time_s"] = np.nan
-    (card,) = found(flights).scorecards
-    (cell,) = card.finding("convergence").cells
-    assert cell.at == {"law": "nftsm paper"}
+def test_holm_makes_a_lonely_test_harder_in_company() -> None:
+    alone = shifted(result_matrix(), "range_error_rms_m", 1.4, scatter=0.3)
+    (judgement,) = card_of(alone).of("range_error_rms_m")
+    assert judgement.word == Verdict.HOLDS
+    many = result_matrix({"guidance_period_s": [0.05 + 0.05 * i for i in range(40)]})
+    many = shifted(shifted(many, "range_error_rms_m", 1.4, scatter=0.3), "sideslip_rms_deg", 1.9, scatter=0.4)
+    word = card_of(many).of("range_error_rms_m")[0]
+    assert word.word == Verdict.UNDECIDED
+    assert "decided on its own, not among" in word.why
 
 
-def test_one_flight_each_is_one_difference_without_interval() -> None:
-    flights = result_matrix()
-    flights = shifted(flights[flights["seed"] == 0], "sideslip_rms_deg", 1.0, scatter=0.0)
-    (card,) = found(flights).scorecards
-    sideslip = card.finding("sideslip")
-    assert sideslip.effect.mean == pytest.approx(1.0)
-    assert sideslip.effect.low is None
-    assert "one seed" in sideslip.effect.why
-    assert sideslip.verdict == HOLDS
-    assert "No interval (one seed: nothing was drawn): " in "\n".join(lines(found(flights)))
+def test_without_a_margin_a_difference_is_lower_or_higher_where_its_interval_excludes_zero() -> None:
+    for by, scatter, word in ((-1.0, 0.1, "lower"), (1.0, 0.1, "higher"), (0.01, 1.0, Verdict.UNDECIDED)):
+        flights = shifted(result_matrix(), "heading_rate_error_rms_deg_s", by, scatter=scatter)
+        (judgement,) = card_of(flights).of("heading_rate_error_rms_deg_s")
+        assert judgement.word == word
 
 
-def test_the_bank_limit_is_the_airframes() -> None:
-    """At 33 deg/s and 13 m/s the relation asks for 37.4 deg; the Ultra Stick's inner loop stops at 46."""
-    flights = result_matrix({"law.max_heading_rate_deg_s": [5.0, 33.0, 50.0]})
-    (card,) = found(flights).scorecards
-    reach = card.finding("reach")
-    needed = [math.degrees(math.atan(13.0 * math.radians(limit) / 9.80665)) for limit in (5.0, 33.0, 50.0)]
-    limit = math.degrees(0.8)
-    assert [cell.mean for cell in reach.cells] == pytest.approx([n - limit for n in needed], abs=0.1)
-    assert (reach.verdict, reach.condition) == (IF, "law.max_heading_rate_deg_s <= 33")
+def test_any_setting_can_be_compared_and_only_consequences_have_margins_then() -> None:
+    flights = result_matrix({"law.gains": ["paper", "paper_1"]})
+    flights["law.alpha2"] = flights["law.gains"].map({"paper": 0.5, "paper_1": 2.0})  # follows the set
+    flights.loc[flights["law.gains"] == "paper_1", "range_error_rms_m"] = 5.0
+    comparison = compare_flights(flights, Assess(), "law.gains", "paper")
+    assert len(comparison.pairs) == 2 * SEEDS
+    (card,) = comparison.scorecards
+    assert {part.column for part in card.parts}.isdisjoint({"sideslip_rms_deg", "turn_ratio"})
+    assert "range_error_rms_m" in {part.column for part in card.parts}
+    assert list(comparison.axes) == ["plant"]
+
+
+def test_the_frames_have_the_columns_of_the_contract() -> None:
+    flights = shifted(result_matrix({"law.max_heading_rate_deg_s": [5.0, 20.0]}), "sideslip_rms_deg", 1.0)
+    comparison = compared(flights)
+    differences = comparison.differences
+    assert {"metric", "value", "law.max_heading_rate_deg_s", "pairs", "seeds", "difference", "low", "high",
+            "verdict"} <= set(differences.columns)  # fmt: skip
+    assert list(comparison.conditions.columns[:2]) == ["metric", "value"]
+    row = differences[(differences["metric"] == "sideslip_rms_deg")].iloc[0]
+    assert row["low"] < row["difference"] < row["high"]
+    assert set(differences["verdict"]) <= {"holds", "fails", "undecided", "lower", "higher"}
+
+
+# Conditions
+
+LIMITS: Mapping[str, list[object]] = {"limit": [5.0, 10.0, 20.0]}
+HOLD, FAIL, OPEN = Verdict.HOLDS, Verdict.FAILS, Verdict.UNDECIDED
+
+
+def cells(words: Mapping[tuple[object, ...], Verdict], names: tuple[str, ...]) -> list[Judgement]:
+    return [
+        Judgement("range_error_rms_m", "sixdof", dict(zip(names, at, strict=True)), 5, 5, 0, 0.0, 0.0, 0.0, 0.0, 0.0,
+                  (-2.0, 2.0), word)
+        for at, word in words.items()
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("words", "verdict", "condition"),
+    [
+        ([HOLD, HOLD, HOLD], Verdict.HOLDS, None),
+        ([HOLD, OPEN, HOLD], Verdict.UNDECIDED, None),
+        ([OPEN, FAIL, FAIL], Verdict.FAILS, None),
+        ([HOLD, HOLD, FAIL], Verdict.HOLDS_IF, "limit = 5 to 10"),
+        ([HOLD, FAIL, FAIL], Verdict.HOLDS_IF, "limit = 5"),
+        ([FAIL, HOLD, HOLD], Verdict.HOLDS_IF, "limit = 10 to 20"),
+        ([FAIL, HOLD, FAIL], Verdict.HOLDS_IF, "limit = 10"),
+        ([HOLD, OPEN, FAIL], Verdict.HOLDS_IF, "limit = 5 to 10"),
+    ],
+)
+def test_a_condition_is_a_stretch_of_flown_values(
+    words: list[Verdict], verdict: Verdict, condition: str | None
+) -> None:
+    at: dict[tuple[object, ...], Verdict] = {(value,): word for value, word in zip(LIMITS["limit"], words, strict=True)}
+    conclusion = conclude(cells(at, ("limit",)), LIMITS)
+    assert conclusion.word == verdict
+    assert (conclusion.condition.text if conclusion.condition else None) == condition
+
+
+def test_a_condition_of_two_axes_is_found() -> None:
+    across: Mapping[str, list[object]] = {**LIMITS, "law": ["a", "b"]}
+    at: dict[tuple[object, ...], Verdict] = {
+        (limit, law): HOLD if limit in (5.0, 10.0) and law == "a" else FAIL for limit, law in product(*across.values())
+    }
+    conclusion = conclude(cells(at, ("limit", "law")), across)
+    assert conclusion.condition is not None
+    assert conclusion.condition.text == "limit = 5 to 10 and law = a"
+
+
+def test_an_axis_that_varies_with_the_cause_is_not_named() -> None:
+    """The long period was flown at the lowest limit alone: what holds there holds by the limit, or by the period."""
+    names = ("limit", "period")
+    across: Mapping[str, list[object]] = {"limit": [5.0, 20.0], "period": [0.05, 0.2]}
+    conclusion = conclude(cells({(5.0, 0.2): HOLD, (20.0, 0.05): FAIL}, names), across)
+    assert (conclusion.word, conclusion.condition) == (Verdict.FAILS, None)
+    assert set(conclusion.confounded) == {"limit", "period"}
+    assert {tuple(cell.values()) for cell in conclusion.missing} == {(5.0, 0.05), (20.0, 0.2)}
+    matched = conclude(cells({(5.0, 0.2): HOLD, (20.0, 0.05): FAIL, (5.0, 0.05): HOLD}, names), across)
+    assert matched.condition is not None
+    assert matched.condition.text == "limit = 5"
+
+
+@given(words=st.lists(st.sampled_from([HOLD, FAIL, OPEN]), min_size=2, max_size=6))
+def test_no_cell_within_a_condition_has_the_opposite_word(words: list[Verdict]) -> None:
+    values: list[object] = [float(i) for i in range(len(words))]
+    at: dict[tuple[object, ...], Verdict] = {(value,): word for value, word in zip(values, words, strict=True)}
+    judgements = cells(at, ("x",))
+    conclusion = conclude(judgements, {"x": values})
+    if (named := conclusion.condition) is not None:
+        inside = [judgement.word for judgement in judgements if named.covers(judgement.at)]
+        assert named.word in inside
+        assert (FAIL if named.word is HOLD else HOLD) not in inside
+
+
+def test_flights_that_would_tell_two_axes_apart_are_printed_as_options() -> None:
+    flights = result_matrix({"law.max_heading_rate_deg_s": [5.0, 20.0], "guidance_period_s": [0.05, 0.2]})
+    together = (flights["law.max_heading_rate_deg_s"] == 5.0) == (flights["guidance_period_s"] == 0.2)
+    flights = flights[together]
+    flights = shifted(flights, "sideslip_rms_deg", 5.0, where={"law.max_heading_rate_deg_s": 20.0})
+    flights = shifted(flights, "sideslip_rms_deg", 0.5, where={"law.max_heading_rate_deg_s": 5.0})
+    text = "\n".join(lines(compared(flights)))
+    assert "Flights that would tell apart what varies together:" not in text  # one axis follows the other: it is one
+    assert "no sideslip holds if" in text

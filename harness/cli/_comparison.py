@@ -17,7 +17,7 @@ def read_comparison(folder: Path, baseline: str, overrides: tuple[str, ...]) -> 
     from harness.comparison import flights_and_margins
     from harness.error import SettingsError
     from harness.runs.store import StoreError, last_run
-    from harness.verdict.comparison import compare
+    from harness.verdict.comparison import compare_flights
     from harness.verdict.pairs import CompareError
     from harness.verdict.report import origin_of
 
@@ -26,7 +26,9 @@ def read_comparison(folder: Path, baseline: str, overrides: tuple[str, ...]) -> 
             raise BadInput(f"--set {override}: only margins can be set here, as in assess.sideslip_deg=3")
     try:
         flights, assess = flights_and_margins(folder, overrides)
-        return compare(flights, assess, baseline), origin_of(str(folder), last_run(folder))
+        run = last_run(folder)
+        comparison = compare_flights(flights, assess, baseline=baseline, question=str(run["question"] or ""))
+        return comparison, origin_of(str(folder), run)
     except SettingsError as error:
         raise BadInput(str(error)) from None
     except (StoreError, CompareError) as error:

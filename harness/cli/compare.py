@@ -28,8 +28,8 @@ def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: st
 
     from harness.cli._comparison import read_comparison
     from harness.cli._progress import busy
-    from harness.verdict.words import lines
-    from harness.verdict.written import as_csv, as_document, as_latex
+    from harness.verdict.export import as_csv, as_document, as_latex
+    from harness.verdict.text import lines
 
     with busy("comparing"):
         comparison, _ = read_comparison(directory, baseline, overrides)

@@ -31,7 +31,6 @@ def demo(out: Path) -> None:
     from harness.runs.store import StoreError
     from harness.runs.workers import WorkersError
     from harness.settings import read_settings
-    from harness.verdict.words import answer
 
     writable_folder(out)
     try:
@@ -43,8 +42,7 @@ def demo(out: Path) -> None:
         raise BadInput(str(error)) from None
     click.echo()
     comparison, _ = read_comparison(out, "kinematic", ())
-    for sentence in answer(comparison):
-        click.echo(sentence)
+    click.echo(comparison.answer)
     key = comparison.pairs.other["key"].iloc[0][:8]
     click.echo(
         f"\nthe full comparison: harness compare {out}\n"

@@ -27,6 +27,11 @@ class Outcome(StrEnum):
     WORKER_DIED = "worker_died"
 
     @property
+    def lost(self) -> bool:
+        """It ended early for a reason of the flight: a result, and never data of a flight that lasted."""
+        return self in (Outcome.GROUND, Outcome.DEPARTED, Outcome.TARGET_LOST)
+
+    @property
     def failed(self) -> bool:
         """Whether the computation failed, so that the flight says nothing about the aircraft or the law."""
         return self in (Outcome.INVALID, Outcome.TIMEOUT, Outcome.WORKER_DIED)

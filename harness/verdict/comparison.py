@@ -1,127 +1,214 @@
-"""A comparison: everything that the flights of one directory say of the plants, computed once for all its readers."""
+"""A comparison: everything that flights which differ in one setting say, computed once for all its readers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
 from harness.margins import Assess
 from harness.metric import METRICS
-from harness.plants.ladder import BASELINE, rung
-from harness.verdict.attribution import Attribution, attributions
-from harness.verdict.pairs import FAILED, Pairs, axes, change, entered, ordered, plant_pairs, spread, varying
-from harness.verdict.parts import with_quantities
-from harness.verdict.scorecard import Scorecard, scorecards
-from harness.verdict.statistics import Effect, effect
+from harness.plants.ladder import BASELINE
+from harness.verdict.conditions import Conclusion, conclude
+from harness.verdict.judgement import Judgement, frame, judged
+from harness.verdict.pairs import (
+    FAILED,
+    Pairs,
+    axes,
+    cells,
+    entered,
+    ordered,
+    pairs_by,
+    shown,
+    spread,
+    varying,
+)
+from harness.verdict.parts import PARTS, Part, with_shares
+from harness.verdict.statistics import Share, share
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """A metric of one airframe under one law: the means of the pairs that say something of it, their difference."""
+class Scorecard:
+    """One airframe under one value of what is compared: the family in which errors are kept."""
 
     aircraft: str
-    law: str
-    plant: str
-    metric: str
-    reference: float  # NaN where the baseline has no such thing
-    other: float
-    difference: Effect
+    value: str
+    pairs: int
+    seeds: int
+    lost: Share
+    axes: Mapping[str, Sequence[object]]
+    judgements: tuple[Judgement, ...]
+
+    def of(self, column: str) -> list[Judgement]:
+        """The judgements of one quantity, cell by cell."""
+        return [judgement for judgement in self.judgements if judgement.column == column]
+
+    @property
+    def parts(self) -> list[Part]:
+        """The parts that were judged, in their order."""
+        known = {judgement.column for judgement in self.judgements if judgement.has_margin}
+        return [part for part in PARTS.values() if part.column in known]
+
+    def conclusion(self, column: str) -> Conclusion:
+        """What all its cells say of a part."""
+        return conclude(self.of(column), self.axes)
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
-    """A flight that is in no pair."""
+class Unpaired:
+    """A flight that is in no pair, and why."""
 
     key: str
     outcome: str
+    why: str
     settings: Mapping[str, object]  # those that vary
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Comparison:
-    """What `harness compare` prints and `harness report` draws."""
+    """Flights that differ in one setting alone, `by`, compared.
 
+    - `answer`: text: what was compared, and each part of the assumption, or each metric that differs, with its worst
+      cell.
+    - `differences`: one row per metric, value of `by` and cell, with the columns `metric` (its unit is its suffix),
+      `value`, one for each axis that varies, `pairs`, `seeds`, `lost`, `reference`, `other`, `difference` (mean of the
+      seeds, other minus reference, or minus what the assumption says), `low` and `high` (its 95 % interval; NaN without
+      one), `verdict` (holds, fails or undecided where there is a margin; lower, higher or undecided without), `why` it
+      is undecided, and the `seeds_needed` to decide it.
+    - `conditions`: where matched cells prove that a part holds or fails: `metric`, `value`, `aircraft`, `verdict`,
+      `condition`, `cells`.
+    """
+
+    by: str  # the setting
     baseline: str
     assess: Assess
     flights: int
-    pairs: Pairs  # as they entered
-    unpaired: tuple[Left, ...]
-    failed: tuple[Left, ...]
-    rows: tuple[Row, ...]
-    scorecards: tuple[Scorecard, ...]  # from the top of the ladder down
-    attributions: tuple[Attribution, ...]
+    pairs: Pairs
+    unpaired: tuple[Unpaired, ...]
+    scorecards: tuple[Scorecard, ...]
+    table: pd.DataFrame = field(repr=False)  # the flights as they entered
+    question: str = ""  # of the experiment
 
     @property
-    def last_plant(self) -> str:
-        """The plant furthest up the ladder: the one the answer is about."""
-        return max((card.plant for card in self.scorecards), key=rung)
+    def assumption(self) -> bool:
+        """Whether it asks for the coordinated-flight assumption: plants beside the one that the paper assumes."""
+        return self.by == "plant" and self.baseline == BASELINE
+
+    @cached_property
+    def axes(self) -> dict[str, list[object]]:
+        """What was set to several values on any airframe."""
+        several: dict[str, list[object]] = {}
+        table = spread(self.pairs.other)
+        if table["aircraft"].nunique() > 1 and self.by != "aircraft":
+            several["aircraft"] = ordered(table["aircraft"])
+        for card in self.scorecards:
+            for axis in card.axes:
+                several.setdefault(axis, ordered(table[axis]))
+        return several
 
     @property
-    def plants(self) -> list[str]:
-        """All but the baseline, up the ladder."""
-        return sorted({card.plant for card in self.scorecards}, key=rung)
+    def values(self) -> list[str]:
+        """The values beside the baseline, in order."""
+        return list(dict.fromkeys(card.value for card in self.scorecards))
+
+    @cached_property
+    def differences(self) -> pd.DataFrame:
+        """One row per metric, value of the setting and cell, with its interval and its verdict."""
+        judgements = [j for card in self.scorecards for j in card.judgements]
+        named = [(j, {"aircraft": card.aircraft, **j.at}) for card in self.scorecards for j in card.judgements]
+        table = frame(judgements, [])
+        for axis in reversed(list(self.axes)):
+            table.insert(2, axis, [at.get(axis) for _, at in named])
+        return table
+
+    @cached_property
+    def conditions(self) -> pd.DataFrame:
+        """Where a part holds or fails: metric, value, aircraft, verdict, condition, cells."""
+        rows = []
+        for card in self.scorecards:
+            for part in card.parts:
+                condition = card.conclusion(part.column).condition
+                if condition:
+                    rows.append((part.column, card.value, card.aircraft, condition.word, condition.text,
+                                 condition.cells))  # fmt: skip
+        return pd.DataFrame(rows, columns=["metric", "value", "aircraft", "verdict", "condition", "cells"])
+
+    @property
+    def answer(self) -> str:
+        """The answer in words."""
+        from harness.verdict.answer import sentences  # which reads comparisons
+
+        return "\n".join(sentences(self))
 
     @property
     def answering(self) -> list[Scorecard]:
-        """Its scorecards."""
-        return [card for card in self.scorecards if card.plant == self.last_plant]
+        """The scorecards of the value furthest from the baseline: those that the answer is about."""
+        return [card for card in self.scorecards if card.value == self.values[-1]]
 
 
-def compare(flights: pd.DataFrame, assess: Assess, baseline: str = BASELINE) -> Comparison:
-    """Of a directory's flights. Raises `CompareError` with what is missing."""
-    table = with_quantities(entered(flights, assess.circling_error))
-    paired = plant_pairs(table, baseline)
+def compare_flights(
+    flights: pd.DataFrame,
+    assess: Assess,
+    by: str = "plant",
+    baseline: object = None,
+    question: str = "",
+) -> Comparison:
+    """Flights of a table as `load_results` gives it, those that differ in `by` alone, paired.
+
+    `baseline` is the value that the others are compared with; without it the lowest plant, else the first value.
+    Raises `CompareError` with what is missing.
+    """
+    if baseline is None:
+        values = ordered(flights[by])
+        baseline = BASELINE if by == "plant" else values[0]
+    table = with_shares(entered(flights, assess.circling_error))
+    paired = pairs_by(table, by, baseline)
     failed = table["outcome"].isin(FAILED)
+    assumption = by == "plant" and shown(baseline) == BASELINE
     return Comparison(
-        baseline,
+        by,
+        shown(baseline),
         assess,
         len(flights),
         paired,
-        tuple(_left(paired.unpaired, table)),
-        tuple(_left(table[failed], table)),
-        tuple(_rows(paired)),
-        tuple(sorted(scorecards(paired, assess, baseline), key=lambda card: -rung(card.plant))),
-        tuple(attributions(table[~failed])),
+        (*_unpaired(paired.unpaired, table, "without a partner"), *_unpaired(table[failed], table, "failed")),
+        tuple(_scorecards(paired, by, assess, assumption=assumption)),
+        table,
+        question,
     )
 
 
-def _left(those: pd.DataFrame, table: pd.DataFrame) -> Iterator[Left]:
-    columns = varying(table)
-    for _, flight in those.iterrows():
-        yield Left(str(flight["key"]), str(flight["outcome"]), {column: flight[column] for column in columns})
-
-
-def _rows(paired: Pairs) -> Iterator[Row]:
-    named = spread(paired.other)
-    law = named["law"] if "law" in named else pd.Series("", index=named.index)
-    kinds = pd.DataFrame({"aircraft": paired.other["aircraft"], "law": law, "plant": paired.other["plant"]})
-    for aircraft, label, plant in (
-        kinds.drop_duplicates().sort_values(["aircraft", "law", "plant"]).itertuples(index=False)
-    ):
-        those = paired.where((kinds == [aircraft, label, plant]).all(axis=1))
-        for metric in (name for name, declared in METRICS.items() if declared.compared):
-            reference, other = those.reference[metric].to_numpy(float), those.other[metric].to_numpy(float)
-            if np.isnan(other).all():
+def _scorecards(pairs: Pairs, by: str, assess: Assess, *, assumption: bool) -> Iterator[Scorecard]:
+    """One per value and airframe."""
+    columns = [*(name for name, metric in METRICS.items() if metric.compared), *PARTS]
+    columns = list(dict.fromkeys(columns))
+    rows = pairs.other.groupby([pairs.other[by].map(shown), "aircraft"], sort=False).indices
+    for value in map(shown, ordered(pairs.other[by])):
+        for aircraft in ordered(pairs.other["aircraft"]):
+            if (value, aircraft) not in rows:
                 continue
-            values = change(those, metric)
-            counts = ~np.isnan(values) | np.isnan(reference)  # what the baseline has not is told of the plant alone
-            found = effect(values, those.other["seed"].to_numpy(), metric)
-            means = _mean(reference[counts]), _mean(other[counts])
-            yield Row(str(aircraft), str(label), str(plant), metric, *means, found)
+            those = pairs.take(np.asarray(rows[value, aircraft], np.intp))
+            across = axes(spread(those.other), {by, "aircraft", *_covered(by)})
+            found = cells(those, across)
+            yield Scorecard(
+                aircraft=str(aircraft),
+                value=value,
+                pairs=len(those),
+                seeds=int(those.other["seed"].nunique()),
+                lost=share(those.lost, those.seeds, drawn=any(cell.drawn for cell in found)),
+                axes=across,
+                judgements=tuple(judged(those, found, columns, value, assess, assumption=assumption)),
+            )
 
 
-def _mean(values: Sequence[float] | np.ndarray) -> float:
-    there = np.asarray(values)[~np.isnan(values)]
-    return float(there.mean()) if len(there) else float("nan")
+def _covered(by: str) -> list[str]:
+    """The axis that the compared setting is part of."""
+    whole = {"law.name": "law", "law.gains": "law", "wind.steady_mps": "wind_speed_mps"}
+    return [whole[by]] if by in whole else []
 
 
-def axes_of(comparison: Comparison) -> dict[str, list[object]]:
-    """What was set to several values on any airframe, and the airframes."""
-    flights = spread(comparison.pairs.other)
-    airframes = ordered(flights["aircraft"])
-    found = {"aircraft": airframes} if len(airframes) > 1 else {}
-    for _, of in flights.groupby("aircraft"):
-        for axis in axes(of):
-            found.setdefault(axis, ordered(flights[axis]))
-    return found
+def _unpaired(flights: pd.DataFrame, table: pd.DataFrame, why: str) -> Iterator[Unpaired]:
+    columns = varying(table)
+    for _, flight in flights.iterrows():
+        yield Unpaired(str(flight["key"]), str(flight["outcome"]), why, {column: flight[column] for column in columns})

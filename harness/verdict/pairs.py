@@ -1,6 +1,5 @@
-"""Pairs: flights that differ in one thing only, and how each flight enters their comparison."""
+"""Pairs: flights that differ in one setting only, the cells they fall into, and how a flight enters a comparison."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,13 +11,17 @@ from numpy.typing import NDArray
 
 from harness.error import HarnessError
 from harness.metric import METRICS
+from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting
 from harness.world.wind import SEVERITIES
 
-LOST = (Outcome.GROUND.value, Outcome.DEPARTED.value, Outcome.TARGET_LOST.value)
+Array = NDArray[np.float64]
+
+LOST = tuple(outcome.value for outcome in Outcome if outcome.lost)
 FAILED = tuple(outcome.value for outcome in Outcome if outcome.failed)
-REFERENCE: Mapping[str, object] = MappingProxyType(  # what is undisturbed, by the columns of `spread`
+SEVERITY = tuple(SEVERITIES)
+UNDISTURBED: Mapping[str, object] = MappingProxyType(  # by the columns of `spread`
     {"wind_speed_mps": 0.0, "wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
 )
 
@@ -28,8 +31,17 @@ class CompareError(HarnessError, ValueError):
 
 
 @dataclass(frozen=True, slots=True)
+class Cell:
+    """One combination of all that was set to several values."""
+
+    at: Mapping[str, object]  # axis -> value
+    rows: NDArray[np.intp]  # of the pairs
+    drawn: bool  # something differs between its seeds: air, noise, a drawn setting
+
+
+@dataclass(frozen=True, slots=True)
 class Pairs:
-    """Two tables of flights, row by row the same but for one thing; and those left without a partner."""
+    """Two tables of flights, row by row the same but for one setting; and those left without a partner."""
 
     reference: pd.DataFrame
     other: pd.DataFrame
@@ -38,10 +50,97 @@ class Pairs:
     def __len__(self) -> int:
         return len(self.reference)
 
-    def where(self, chosen: pd.Series) -> "Pairs":
-        """The pairs that are chosen, by a mask over the rows."""
-        rows = chosen.to_numpy()
-        return Pairs(self.reference[rows], self.other[rows], self.unpaired)
+    @property
+    def seeds(self) -> NDArray[np.generic]:
+        return self.other["seed"].to_numpy()
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Whether the other flight ended early."""
+        return self.other["lost"].to_numpy(bool)
+
+    def take(self, rows: NDArray[np.intp]) -> "Pairs":
+        """The pairs in these rows."""
+        reference, other = (table.iloc[rows].reset_index(drop=True) for table in (self.reference, self.other))
+        return Pairs(reference, other, self.unpaired)
+
+    def difference(self, column: str, assumed: float | None) -> Array:
+        """Other minus reference, or minus what is assumed of the other; NaN where the pair says nothing.
+
+        That is where a flight has no such number; of a metric of circling where the law does not circle on the
+        reference; of the convergence time where not both converge.
+        """
+        other = self.other[column].to_numpy(float)
+        values = other - (self.reference[column].to_numpy(float) if assumed is None else assumed)
+        metric = METRICS.get(column)
+        if metric is not None and metric.of_circling and assumed is None:
+            values = np.where(self.reference["circles"].to_numpy(bool), values, np.nan)
+        return np.asarray(values, np.float64)
+
+    def converged_alone(self, rows: NDArray[np.intp]) -> tuple[int, int]:
+        """In how many of these pairs only the reference, and only the other converges."""
+        first = self.reference["converged"].to_numpy(bool)[rows]
+        second = self.other["converged"].to_numpy(bool)[rows]
+        return int((first & ~second).sum()), int((second & ~first).sum())
+
+
+def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
+    """The flights as they enter a comparison, with the columns lost, converged and circles.
+
+    A flight that ended early has no metrics: it is counted as lost. A flight circles when it lasts and its settled
+    error is below `circling` times the standoff distance.
+    """
+    table = flights.copy()
+    lost = table["outcome"].isin(LOST)
+    for name in METRICS:
+        if name in table:
+            number = pd.Series(table[name].to_numpy(float, na_value=np.nan), index=table.index)  # true counts as 1
+            table[name] = number.where(~lost)
+        else:
+            table[name] = np.nan
+    table["overshoot_m"] = table["overshoot_m"].fillna(0.0).where(~lost)  # an error without a change of sign
+    table["lost"] = lost.astype(float)
+    table["converged"] = (table["convergence_time_s"].notna() & ~lost).astype(float)
+    table["circles"] = (table["range_error_rms_m"] <= circling * table["law.standoff_m"]) & ~lost
+    return table
+
+
+def pairs_by(flights: pd.DataFrame, key: str, baseline: object) -> Pairs:
+    """Every flight beside the one that differs in the setting `key` alone and has the baseline's value of it.
+
+    Raises `CompareError` with what is missing.
+    """
+    if len(flights) < 2:
+        raise CompareError(f"{len(flights)} flight in all: a comparison takes at least two that differ in {key}")
+    values = ordered(flights[key])
+    if not any(_same(baseline, value) for value in values):
+        raise CompareError(
+            f"no flight has the baseline, {key} = {shown(baseline)}: there is {', '.join(map(shown, values))}. "
+            "Add it to the matrix, or name another with --baseline"
+        )
+    if len(values) == 1:
+        raise CompareError(
+            f"all {len(flights)} flights have {key} = {shown(values[0])}: add another value to the matrix"
+        )
+    judged = flights[~flights["outcome"].isin(FAILED)]
+    is_reference = judged[key].map(lambda value: _same(value, baseline)).astype(bool)
+    paired = pairs(judged, bundle(judged, key), is_reference)
+    if not len(paired):
+        raise CompareError(_why_unpaired(judged, key, is_reference) if len(judged) else "every flight failed: no pairs")
+    return paired
+
+
+def bundle(flights: pd.DataFrame, key: str) -> list[str]:
+    """The settings that change with this one: single gains with a law or its set, nothing with anything else."""
+    if key not in ("law.name", "law.gains"):
+        return [key]
+    own = ["law.name", "law.gains"] if key == "law.name" else ["law.gains"]
+    texts = joined(flights, [column for column in ("law.name", "law.gains") if column in flights])
+    gains = [c for c in settings_of(flights) if c.startswith("law.") and c not in own and _follows(flights[c], texts)]
+    return [*own, *(c for c in gains if flights[c].nunique(dropna=False) > 1 and c not in _SHARED)]
+
+
+_SHARED = ("law.name", "law.standoff_m", "law.max_heading_rate_deg_s", "law.direction", "law.airspeed", "law.command")
 
 
 def settings_of(flights: pd.DataFrame) -> list[str]:
@@ -64,90 +163,19 @@ def _follows(values: pd.Series, others: Sequence[str]) -> bool:
     return bool(_text(values).groupby(list(others)).nunique().max() == 1)
 
 
-def plant_pairs(flights: pd.DataFrame, baseline: str) -> Pairs:
-    """Every flight beside the one that differs in the plant alone. Raises `CompareError` when there is none."""
-    if len(flights) < 2:
-        raise CompareError(
-            f"{len(flights)} flight in all: a comparison takes at least two, of {baseline} and another plant"
-        )
-    plants = sorted(set(flights["plant"]))
-    if baseline not in plants:
-        raise CompareError(
-            f"no flight has the baseline's plant, {baseline!r}: there is {_listed(plants)}. Add it to the matrix, "
-            f"or name another with --baseline"
-        )
-    if len(plants) == 1:
-        raise CompareError(f"all {len(flights)} flights have plant {baseline!r}: add another plant to the matrix")
-    judged = flights[~flights["outcome"].isin(FAILED)]
-    paired = pairs(judged, ["plant"], judged["plant"] == baseline)
-    if not len(paired):
-        raise CompareError(_why_unpaired(judged, baseline) if len(judged) else "every flight failed: nothing to pair")
-    return paired
-
-
 def pairs(flights: pd.DataFrame, differing: Sequence[str], is_reference: pd.Series) -> Pairs:
     """Each flight that is no reference beside the reference that differs from it in `differing` alone."""
     alike = _alike(flights, differing)
     reference = flights[is_reference]
     at = {key: i for i, key in zip(reference.index, alike[is_reference], strict=True)}
     partner = alike[~is_reference].map(at)
-    found = partner.dropna()
-    left = ~(flights.index.isin(found) | flights.index.isin(found.index))
+    known = partner.dropna()
+    left = ~(flights.index.isin(known) | flights.index.isin(known.index))
     return Pairs(
-        flights.loc[found.to_numpy()].reset_index(drop=True),
-        flights.loc[found.index].reset_index(drop=True),
+        flights.loc[known.to_numpy()].reset_index(drop=True),
+        flights.loc[known.index].reset_index(drop=True),
         flights[left],
     )
-
-
-def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
-    """The flights as they enter a comparison: every number there that a comparison needs.
-
-    A flight circles when it lasts and its settled error is below `circling` times the standoff distance.
-
-    A flight that has not converged when it ends, or has ended early, enters with its duration as convergence time
-    (censored). One that ended early (ground, departed, target lost) enters every other metric that its plant has with
-    the worst value that there can be, or that any flight here has. An error that never changed sign has overshot by
-    nothing.
-    """
-    table = flights.copy()
-    lost = table["outcome"].isin(LOST)
-    table["lost"] = lost
-    table["circles"] = (table["range_error_rms_m"] <= circling * table["law.standoff_m"]) & ~lost
-    table["converged"] = table["convergence_time_s"].notna() & ~lost
-    table["convergence_time_s"] = table["convergence_time_s"].where(table["converged"], table["duration_s"])
-    table["overshoot_m"] = table["overshoot_m"].fillna(0.0)
-    table["range_error_final_m"] = table["range_error_final_m"].abs()
-    for name, metric in METRICS.items():
-        if name == "convergence_time_s" or not metric.compared:
-            continue
-        table[name] = table[name].to_numpy(float, na_value=np.nan)  # what is true or false counts as 1 or 0
-        measured = table[name].dropna()
-        has_it = table["plant"].isin(set(table["plant"][measured.index]))
-        worst = _worst(measured, metric.ideal) if metric.worst is None else metric.worst
-        table.loc[lost & has_it, name] = worst
-    return table
-
-
-def _worst(measured: pd.Series, ideal: float) -> float:
-    values = measured.to_numpy(float)
-    return float(values[np.abs(values - ideal).argmax()]) if len(values) else math.nan
-
-
-def change(pairs: Pairs, metric: str) -> NDArray[np.float64]:
-    """Other minus reference, of a metric or another column; NaN where the pair says nothing of it.
-
-    That is where one of the flights has no such thing; of what is `of_circling`, where the reference does not circle;
-    of the convergence time, where both flights last and neither converges.
-    """
-    before, after = pairs.reference, pairs.other
-    values = after[metric].to_numpy(float) - before[metric].to_numpy(float)
-    says = np.ones(len(pairs), bool)
-    if metric in METRICS and METRICS[metric].of_circling:
-        says &= before["circles"].to_numpy(bool)
-    if metric == "convergence_time_s":
-        says &= (before["converged"] | after["converged"].to_numpy() | after["lost"].to_numpy()).to_numpy(bool)
-    return np.where(says, values, np.nan)
 
 
 def spread(flights: pd.DataFrame) -> pd.DataFrame:
@@ -163,43 +191,82 @@ def spread(flights: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def axes(table: pd.DataFrame, without: Iterable[str] = ("plant", "aircraft")) -> dict[str, list[object]]:
-    """The settings that were set, not drawn, to several values; with the values in order.
+def axes(table: pd.DataFrame, without: Iterable[str] = ()) -> dict[str, list[object]]:
+    """The settings that were set, not drawn, to several values; with the values in order. Of a table as `spread` gives.
 
     What takes one value only within every seed was drawn. What follows from another axis (a law's gains, a duration
     set with a radius) is that axis.
     """
-    columns = [c for c in varying(table) if c not in {*without, "seed"}]
-    columns.sort(key=lambda column: column != "law")
+    columns = [c for c in _varying_spread(table) if c not in {*without, "seed"}]
+    columns.sort(key=lambda column: ("aircraft", "law").index(column) if column in ("aircraft", "law") else 2)
     seeds = table["seed"]
-    found: list[str] = []
+    chosen: list[str] = []
     for column in columns:
         values = _text(table[column])
         drawn = seeds.nunique() > 1 and values.groupby(seeds).nunique().max() == 1
-        follows = any(_follows(values, _text(table[axis]).tolist()) for axis in found)
+        follows = any(_follows(values, _text(table[axis]).tolist()) for axis in chosen)
         if not drawn and not follows:
-            found.append(column)
-    return {column: ordered(table[column]) for column in found}
+            chosen.append(column)
+    return {column: ordered(table[column]) for column in chosen}
 
 
-SEVERITY = tuple(SEVERITIES)
+def _varying_spread(table: pd.DataFrame) -> list[str]:
+    settings = [c for c in varying(table) if not (c.startswith("law.") and _follows_law(table, c))]
+    named = [c for c in ("law", "wind_speed_mps") if c in table and table[c].nunique(dropna=False) > 1]
+    return list(dict.fromkeys([*settings, *named]))
+
+
+def _follows_law(table: pd.DataFrame, column: str) -> bool:
+    return "law" in table and _follows(table[column], table["law"].astype(str).tolist())
+
+
+def cells(pairs: Pairs, across: Iterable[str]) -> list[Cell]:
+    """The cells of pairs, by these axes."""
+    table = spread(pairs.other)
+    columns = list(across)
+    rows: dict[str, list[int]] = {}
+    for row, text in enumerate(joined(table, columns) if columns else [""] * len(table)):
+        rows.setdefault(text, []).append(row)
+    known = [np.asarray(indices) for indices in rows.values()]
+    return [Cell({c: table[c].iloc[r[0]] for c in columns}, r, _is_drawn(pairs.other.iloc[r])) for r in known]
+
+
+def _is_drawn(flights: pd.DataFrame) -> bool:
+    """Whether the seed changes anything: air, noise, or a setting that differs between its flights."""
+    noisy = {"wind.turbulence": "none", "estimator.kind": "truth"}
+    if any(name in flights and (flights[name] != quiet).any() for name, quiet in noisy.items()):
+        return True
+    return any(flights[column].nunique(dropna=False) > 1 for column in settings_of(flights) if column != "seed")
 
 
 def ordered(values: pd.Series) -> list[object]:
-    """The different values in their order: of numbers, of severities, else of words."""
+    """The different values in their order: of numbers, of severities, of plants up the ladder, else of words."""
     different = list(dict.fromkeys(values))
     if is_ordered(different):
         return sorted(different, key=_rank)
+    if all(value in PLANTS for value in different):
+        return sorted(different, key=lambda value: list(PLANTS).index(str(value)))
     return sorted(different, key=str)
 
 
 def is_ordered(values: Sequence[object]) -> bool:
-    """Whether `<=` means something among them."""
+    """Whether one of them lies between two others."""
     return all(_is_number(v) for v in values) or all(v in SEVERITY for v in values)
+
+
+def shown(value: object) -> str:
+    """A setting's value, short."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(shown, value))}]"
+    return f"{value:g}" if isinstance(value, float | np.floating) else str(value)
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float | np.number) and not isinstance(value, bool | np.bool_)
+
+
+def _same(value: object, other: object) -> bool:
+    return value == other or str(value) == str(other) or shown(value) == shown(other)
 
 
 def _rank(value: Any) -> float:
@@ -208,7 +275,8 @@ def _rank(value: Any) -> float:
 
 def _alike(flights: pd.DataFrame, differing: Sequence[str]) -> pd.Series:
     """A text per flight, equal for those that differ in `differing` alone."""
-    columns = [column for column in varying(flights) if column not in differing]
+    columns = [column for column in settings_of(flights) if column not in differing]
+    columns = [column for column in columns if flights[column].nunique(dropna=False) > 1]
     if not columns:
         return pd.Series("", index=flights.index)
     return pd.Series(joined(flights, columns), index=flights.index)
@@ -223,22 +291,17 @@ def _text(column: pd.Series) -> pd.Series:
     return pd.Series(list(map(str, column.tolist())), index=column.index, dtype=object)
 
 
-def _why_unpaired(flights: pd.DataFrame, baseline: str) -> str:
-    """The smallest difference, beside the plant, that keeps a flight from a partner."""
-    first = flights[flights["plant"] != baseline]
-    second = flights[flights["plant"] == baseline]
+def _why_unpaired(flights: pd.DataFrame, key: str, is_reference: pd.Series) -> str:
+    """The smallest difference, beside the key, that keeps a flight from a partner."""
+    first, second = flights[~is_reference], flights[is_reference]
     if not len(first) or not len(second):
-        return f"no flight of plant {baseline!r}, or none of another, ended in a result"
-    columns = [column for column in varying(flights) if column != "plant"]
-    one = {column: str(first.iloc[0][column]) for column in columns}
+        return f"no flight with the baseline's {key}, or none with another, ended in a result"
+    columns = [column for column in varying(flights) if column not in bundle(flights, key)]
+    apart = {column: str(first.iloc[0][column]) for column in columns}
     differing = min(
-        ([column for column in columns if str(row[column]) != one[column]] for _, row in second.iterrows()), key=len
+        ([column for column in columns if str(row[column]) != apart[column]] for _, row in second.iterrows()), key=len
     )
     return (
-        f"no two of the {len(flights)} flights differ in the plant alone: the first of plant "
-        f"{first.iloc[0]['plant']!r} differs from the nearest of {baseline!r} in {_listed(differing)} too"
+        f"no two of the {len(flights)} flights differ in {key} alone: the first with {key} = "
+        f"{shown(first.iloc[0][key])} differs from the nearest of the baseline in {', '.join(differing)} too"
     )
-
-
-def _listed(words: Sequence[str]) -> str:
-    return ", ".join(words)

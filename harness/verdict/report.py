@@ -1,26 +1,24 @@
-"""The report: a comparison as one self-contained page, and as the Markdown of `docs/results.md`."""
+"""The report: a comparison as one self-contained page."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
-import pandas as pd
-
-from harness.metric import METRICS as ALL_METRICS
+from harness.drawing import draw
 from harness.settings.written import written
 from harness.template import template
-from harness.verdict import figures, words
-from harness.verdict.attribution import METRICS, Attribution
-from harness.verdict.comparison import Comparison, Row, axes_of
-from harness.verdict.pairs import axes, change, spread
-from harness.verdict.scorecard import Finding, Scorecard, shown
-from harness.verdict.statistics import CONFIDENCE, LEAST_SEEDS, RESAMPLES
+from harness.verdict import answer, figures
+from harness.verdict.comparison import Comparison, Scorecard
+from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
+from harness.verdict.pairs import shown, spread
+from harness.verdict.parts import PARTS, Group
+from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
+from harness.vocabulary import SIGNS, Verdict
 
-_MAP = Path(__file__).parents[2] / "docs" / "images" / "limit_cycle.svg"  # of `harness.studies.limit_cycle`
-MOST_FLIGHTS = 60  # pairs listed on a page
-MOST_DRAWN = 12  # airframes and laws whose attribution is drawn: the page stays below 3 MB
+MOST_FLIGHTS = 60  # pairs listed
+MOST_LADDERS = 12  # drawn: the page stays below 3 MB
+MOST_DISTURBED = 200  # rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class Origin:
     flown: str  # when, and with which code
 
 
-class Figure(NamedTuple):
+class Drawing(NamedTuple):
     """An SVG and what it shows."""
 
     svg: str
@@ -45,147 +43,99 @@ class Listed(NamedTuple):
     """A pair of flights, why it is listed, and how to see it."""
 
     why: str
-    plant: str
+    value: str
     settings: str
     outcome: str
     keys: tuple[str, str]
     command: str
 
 
-class Shading(NamedTuple):
-    """The share of a part's cells that pass at one value of an axis."""
-
-    axis: str
-    value: str
-    passed: int
-    of: int
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """The paired differences of one airframe under one law: per metric and plant, as far as they are there."""
-
-    aircraft: str
-    law: str
-    plants: list[str]
-    pairs: int
-    metrics: dict[str, dict[str, Row]]
-
-
 def page(comparison: Comparison, origin: Origin) -> str:
     """The HTML page."""
-    return _rendered("report.html.jinja", comparison, origin)
+    added = list(_disturbances(comparison)) if comparison.by == "plant" else []
+    judged_parts = [part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)]
+    return template("harness.verdict", "report.html.jinja").render(
+        comparison=comparison,
+        origin=origin,
+        answer=comparison.answer.splitlines(),
+        words=answer,
+        signs=SIGNS,
+        Verdict=Verdict,
+        groups=[group for group in Group if any(part.group is group for part in judged_parts)],
+        parts=judged_parts,
+        axes={axis: answer.values(values) for axis, values in comparison.axes.items()},
+        margins=written(comparison.assess),
+        drawings=lambda card: list(_intervals(card)) if card in comparison.answering else [],
+        ladders=list(_ladders(comparison)) if comparison.by == "plant" else [],
+        disturbances=added[:MOST_DISTURBED],
+        more_disturbances=max(0, len(added) - MOST_DISTURBED),
+        listed=list(listed(comparison, origin.folder)),
+        shown=shown,
+        confidence=f"{100 * CONFIDENCE:.0f} %",
+        least_seeds=LEAST_SEEDS,
+        least_equal=LEAST_EQUAL,
+    )
 
 
 def markdown(comparison: Comparison, origin: Origin) -> str:
-    """The same without figures and flights, for `docs/results.md`."""
-    return _rendered("results.md.jinja", comparison, origin)
-
-
-def _rendered(name: str, comparison: Comparison, origin: Origin) -> str:
-    html = name.endswith("html.jinja")
-    return template("harness.verdict", name).render(
+    """The answer and the matrix of parts and airframes in Markdown, with the commands that made them."""
+    return template("harness.verdict", "report.md.jinja").render(
         comparison=comparison,
         origin=origin,
-        answer=words.answer(comparison),
-        compared=list(words.compared(comparison)),
-        left_out=list(words.left_out(comparison)),
-        axes={axis: [shown(value) for value in values] for axis, values in axes_of(comparison).items()},
+        answer=comparison.answer,
+        words=answer,
+        signs=SIGNS,
+        parts=[part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)],
+        conditions=list(comparison.conditions.itertuples(index=False)),
         margins=written(comparison.assess),
-        words=words,
-        metrics=METRICS,
-        shading=shading,
-        breaks_first=words.breaks_first,
-        tables=list(_tables(comparison)),
-        distributions=_distributions(comparison) if html else None,
-        attributions=[
-            (a, _attributed(a) if html else []) for a in comparison.attributions[: MOST_DRAWN if html else None]
-        ],
-        undrawn=max(0, len(comparison.attributions) - MOST_DRAWN),
-        map=_map() if html else None,
-        listed=list(listed(comparison, origin.folder)) if html else [],
-        confidence=f"{100 * CONFIDENCE:.0f} %",
-        resamples=RESAMPLES,
-        least_seeds=LEAST_SEEDS,
     )
 
 
-def _tables(comparison: Comparison) -> Iterator[Table]:
-    for kind in dict.fromkeys((row.aircraft, row.law) for row in comparison.rows):
-        those = [row for row in comparison.rows if (row.aircraft, row.law) == kind]
-        metrics: dict[str, dict[str, Row]] = {metric: {} for metric in ALL_METRICS}
-        for row in those:
-            metrics[row.metric][row.plant] = row
-        plants = [plant for plant in comparison.plants if any(row.plant == plant for row in those)]
-        pairs = max(row.difference.pairs for row in those)
-        yield Table(*kind, plants, pairs, {metric: rows for metric, rows in metrics.items() if rows})
-
-
-def _distributions(comparison: Comparison) -> Figure:
-    plant = comparison.last_plant
-    return Figure(
-        figures.draw(partial(figures.distributions, comparison=comparison, plant=plant), height=3.4),
-        f"Paired differences, {plant} minus {comparison.baseline}: the share of pairs below. Shaded: the margin, where "
-        "it is absolute. A flight that ended early enters with the worst value, one that never converges with "
-        "its duration.",
-    )
-
-
-def _attributed(attribution: Attribution) -> list[Figure]:
-    """The waterfall and the disturbances of one airframe under one law, as far as they were flown."""
-    found = []
-    if attribution.ladders:
-        found.append(
-            Figure(
-                figures.draw(partial(figures.waterfall, attribution=attribution), height=4.6),
-                f"What each rung adds, in the mean over the {attribution.scenarios} scenarios flown on all of them in "
-                f"which the law circles on {attribution.rungs[0]}; a "
-                "dark line is the 95 % interval of that step.",
+def _intervals(card: Scorecard) -> Iterator[Drawing]:
+    """The cells of each group of parts, as intervals beside their margins."""
+    for group in Group:
+        parts = [part for part in card.parts if part.group is group]
+        if parts:
+            cells = max(min(figures.MOST_CELLS, len(card.of(part.column))) for part in parts)
+            svg = draw(partial(figures.intervals, card=card, parts=parts), height=1.2 + 0.16 * cells)
+            yield Drawing(
+                svg,
+                f"{group}: the difference in each cell with its {100 * CONFIDENCE:.0f} % interval. Shaded: what is "
+                "asked. Circle: holds; cross: fails; diamond: undecided.",
             )
+
+
+def _ladders(comparison: Comparison) -> Iterator[Drawing]:
+    """The waterfall of every undisturbed cell, as far as the page has room."""
+    by_cell: dict[str, list[Ladder]] = {}
+    for ladder in ladders(comparison.table):
+        by_cell.setdefault(f"{ladder.aircraft} {dict(ladder.at)}", []).append(ladder)
+    for cell in list(by_cell.values())[:MOST_LADDERS]:
+        first = cell[0]
+        where = answer.place(first.at)
+        yield Drawing(
+            draw(partial(figures.waterfall, ladders=cell), height=2.6),
+            f"{first.aircraft}{', ' if where else ''}{where}, undisturbed, {answer.counted(first.seeds, 'seed')}: what "
+            "each rung adds to the same flights.",
         )
-    if attribution.disturbances:
-        whats = len({step.what for step in attribution.disturbances})
-        found.append(
-            Figure(
-                figures.draw(partial(figures.disturbances, attribution=attribution), height=1.5 + 0.4 * whats),
-                "What each disturbance adds to the same flight without it, all else equal.",
-            )
-        )
-    return found
 
 
-def _map() -> Figure | None:
-    """The map of the gains, which is the airframes' and not of these flights; only a checkout has it."""
-    if not _MAP.is_file():
-        return None
-    svg = _MAP.read_text(encoding="utf-8")
-    return Figure(
-        svg[svg.index("<svg") :],
-        "Reaching gains k2 and k3 of NFTSM against the bandwidth of the inner loop: the predicted border of the limit "
-        "cycle and flown points, from docs/limit_cycle.md. It is of the airframes, not of the flights of this run.",
-    )
-
-
-def shading(card: Scorecard, finding: Finding) -> Iterator[Shading]:
-    """Where a part passes: per axis and value."""
-    for axis, values in card.axes.items():
-        for value in values:
-            there = [cell for cell in finding.cells if cell.at[axis] == value]
-            yield Shading(axis, shown(value), sum(cell.passes for cell in there), len(there))
+def _disturbances(comparison: Comparison) -> Iterator[Disturbed]:
+    yield from disturbances(comparison.table, (comparison.baseline, comparison.values[-1]))
 
 
 def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
-    """The pairs worth a look: per airframe and plant the lost, the worst of each consequence and the middle one."""
+    """The pairs worth a look: the lost ones, and per airframe and value the worst and the middle settled error."""
     pairs = comparison.pairs
     named = spread(pairs.other)
-    columns = [*axes(named), "seed"]
+    columns = [axis for axis in comparison.axes if axis in named and axis != "aircraft"]
     for index, why in list(_chosen(comparison).items())[:MOST_FLIGHTS]:
         before, after = pairs.reference.loc[index], pairs.other.loc[index]
         keys = str(before["key"])[:12], str(after["key"])[:12]
         yield Listed(
             "; ".join(why),
-            f"{after['plant']} {after['aircraft']}",
-            ", ".join(f"{column} = {shown(named.loc[index, column])}" for column in columns),
+            f"{after[comparison.by]} {after['aircraft']}",
+            ", ".join(f"{column} = {shown(named.loc[index, column])}" for column in [*columns, "seed"]),
             str(after["outcome"]),
             keys,
             f"harness view {folder} --flight {keys[0]} --flight {keys[1]}",
@@ -196,23 +146,16 @@ def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
     """Rows of the pairs, and why each was chosen."""
     chosen: dict[int, list[str]] = {}
     other = comparison.pairs.other
-    metrics = ("range_error_rms_m", "convergence_time_s", "command_activity_deg_s2")
-    changes = pd.DataFrame({metric: change(comparison.pairs, metric) for metric in metrics}, index=other.index)
-    for rows in other.groupby(["aircraft", "plant"]).groups.values():
-        for metric in metrics:
-            ranked = changes.loc[rows, metric].dropna().sort_values()
-            if len(ranked) and ranked.iloc[-1] > 0:
-                _add(chosen, ranked.index[-1], f"{METRICS[metric][0]} worst, {words.signed(ranked.iloc[-1])}")
-            if len(ranked) and metric == "range_error_rms_m":
-                middle = ranked.index[len(ranked) // 2]
-                _add(chosen, middle, f"{METRICS[metric][0]} in the middle, {words.signed(ranked.loc[middle])}")
-    for index in other.index[other["lost"]]:
-        _add(chosen, index, str(other.loc[index, "reason"]) or "ended early")
+    error = comparison.pairs.difference("range_error_rms_m", None)
+    for rows in other.groupby(["aircraft", comparison.by]).groups.values():
+        ranked = sorted((row for row in map(int, rows) if error[row] == error[row]), key=lambda row: error[row])
+        if ranked:
+            worst, middle = ranked[-1], ranked[len(ranked) // 2]
+            chosen.setdefault(worst, []).append(f"settled error worst, {answer.signed(error[worst])} m rms")
+            chosen.setdefault(middle, []).append(f"settled error in the middle, {answer.signed(error[middle])} m rms")
+    for row in map(int, other.index[other["lost"] > 0]):
+        chosen.setdefault(row, []).append(str(other.loc[row, "reason"]) or "ended early")
     return chosen
-
-
-def _add(chosen: dict[int, list[str]], index: object, why: str) -> None:
-    chosen.setdefault(int(str(index)), []).append(why)
 
 
 def origin_of(folder: str, run: Mapping[str, object]) -> Origin:

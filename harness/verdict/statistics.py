@@ -1,93 +1,161 @@
-"""What pairs say: mean differences with their intervals, equivalence, convergence, shares.
+"""What paired differences say of their mean: an interval, and the evidence for a word.
 
-The *mean* of the paired differences, since means add up along the ladder of plants and a censored mean is the
-restricted mean of survival analysis; its BCa interval, since differences are skewed. Draws are independent, flights of
-one seed are not: an interval resamples the seeds' means.
+Flights of one seed share air, noise and start, so a seed is one draw however many flights it has: every number here is
+made of the means of seeds. Below `LEAST_SEEDS` seeds there is no interval.
+
+The interval is, on each side, the wider of two: that of Student's T, and that of Hall's cubic transformation of T
+(1992, *On the removal of skewness by transformation*, J. R. Statist. Soc. B 54), which follows the skewness of the
+sample. Both take the quantiles of half of the degrees of freedom: a family of tests reaches far into the tails, of
+which few seeds say little. `docs/reference/statistics.md` shows how often the interval holds the truth and how often a
+word is false.
 """
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from harness.world.randomness import stream
-
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
-RESAMPLES = 9999
-LEAST_SEEDS = 5  # of fewer draws a bootstrap knows too little
+LEAST_SEEDS = 5  # of fewer draws an interval knows too little of the scatter
+LEAST_EQUAL = 14  # equal draws exclude, at 95 %, that one seed in five differs: 1 - 0.05^(1/14) = 0.19
+MOST_SEEDS = 10_000  # beyond it "more seeds" is no advice
 
 
-class Effect(NamedTuple):
-    """A mean and its 95 % interval, or why there is none. NaN when there are no values."""
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The differences of one cell, as means of seeds."""
 
-    mean: float
-    low: float | None
-    high: float | None
+    means: Array  # one per seed
     pairs: int
-    seeds: int
-    why: str  # there is no interval; empty when there is one
+    drawn: bool  # something differs between seeds: air, noise, a start
+
+    @property
+    def seeds(self) -> int:
+        return len(self.means)
+
+    @property
+    def mean(self) -> float:
+        """NaN of nothing."""
+        return float(self.means.mean()) if len(self.means) else math.nan
+
+    @property
+    def is_exact(self) -> bool:
+        """Nothing is left to chance: nothing was drawn, or enough draws are all equal."""
+        return self.seeds > 0 and not self.varies and (not self.drawn or self.seeds >= LEAST_EQUAL)
+
+    @property
+    def varies(self) -> bool:
+        """Whether the seeds differ by more than rounding."""
+        return bool(len(self.means)) and bool(np.ptp(self.means) > 1e-9 * max(1e-3, float(np.abs(self.means).max())))
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether there is an interval, of no width where the difference is exact."""
+        return self.is_exact or (self.varies and self.seeds >= LEAST_SEEDS)
+
+    @property
+    def why_not(self) -> str:
+        """Why there is no interval; empty when there is one."""
+        if self.is_judged:
+            return ""
+        if not self.seeds:
+            return "no pairs"
+        if not self.varies and self.seeds > 1:
+            return f"all {self.seeds} seeds agree; {LEAST_EQUAL} are needed to exclude that one in five does not"
+        return f"{self.seeds} seed{'s' if self.seeds > 1 else ''}; {LEAST_SEEDS} are needed"
+
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval of the mean; None when there is none."""
+        if self.is_exact:
+            return self.mean, self.mean
+        if not self.is_judged:
+            return None
+        T = float(special.stdtrit(self._degrees, 0.5 + 0.5 * CONFIDENCE))
+        scale, a = self._scale()
+        low = max(T, _untransformed(T, a))
+        high = min(-T, _untransformed(-T, a))
+        return self.mean - low * scale, self.mean - high * scale
+
+    def p_above(self, bound: float) -> float:
+        """One-sided p-value that the mean is not above the bound: small is evidence that it is."""
+        if self.is_exact:
+            return 0.0 if self.mean > bound else 1.0
+        if not self.is_judged:
+            return 1.0
+        scale, a = self._scale()
+        T = (self.mean - bound) / scale
+        return float(special.stdtr(self._degrees, -min(T, _transformed(T, a))))
+
+    def p_below(self, bound: float) -> float:
+        """The same for a mean below the bound."""
+        return self.shifted(0.0, -1.0).p_above(-bound)
+
+    def shifted(self, by: Array | float, sign: float = 1.0) -> "Sample":
+        """The sample of sign (means - by)."""
+        return Sample(sign * (self.means - by), self.pairs, self.drawn)
+
+    @property
+    def _degrees(self) -> float:
+        """Degrees of freedom of the quantiles."""
+        return 0.5 * (self.seeds - 1)
+
+    def _scale(self) -> tuple[float, float]:
+        """The standard error, and the skewness over the root of the number of seeds."""
+        n, d = self.seeds, self.means - self.means.mean()
+        variance = float(d @ d) / n
+        skewness = float(np.mean(d**3)) / variance**1.5 * math.sqrt(n * (n - 1)) / (n - 2)
+        return math.sqrt(variance / (n - 1)), skewness / math.sqrt(n)
 
 
-class Share(NamedTuple):
-    """A proportion with its 95 % interval (Wilson's)."""
-
-    number: int
-    of: int
-    share: float
-    low: float
-    high: float
+def _transformed(T: float, a: float) -> float:
+    """Hall's transformation of Student's T, a the skewness over the root of n; it rises with T."""
+    return T + a * T * T / 3.0 + a * a * T**3 / 27.0 + a / 6.0
 
 
-def effect(values: Array, seeds: Sequence[object] | NDArray[np.generic], purpose: str) -> Effect:
-    """The mean over the seeds' means, with a BCa interval from the random stream of `purpose`. NaN counts as absent."""
+def _untransformed(y: float, a: float) -> float:
+    """Its inverse."""
+    return 3.0 / a * (math.cbrt(1.0 + a * (y - a / 6.0)) - 1.0) if abs(a) > 1e-9 else y
+
+
+def sample(values: Array, seeds: Sequence[object] | NDArray[np.generic], *, drawn: bool) -> Sample:
+    """The differences by seed; NaN counts as absent."""
     there = ~np.isnan(values)
     values = values[there]
     if not len(values):
-        return Effect(np.nan, None, None, 0, 0, "no pairs")
-    labels, belongs = np.unique(np.asarray(seeds)[there], return_inverse=True)
-    means = np.bincount(belongs, weights=values) / np.bincount(belongs)
-    mean, count = float(means.mean()), len(labels)
-    why = ""
-    if count == 1:
-        why = "one seed: nothing was drawn"
-    elif not varies(means):
-        why = "no variation: the seeds change nothing"
-    elif count < LEAST_SEEDS:
-        why = f"{count} seeds are too few, {LEAST_SEEDS} are needed"
-    if why:
-        return Effect(mean, None, None, len(values), count, why)
-    interval = stats.bootstrap(
-        (means,), np.mean, confidence_level=CONFIDENCE, n_resamples=RESAMPLES, rng=stream(0, f"bootstrap {purpose}")
-    ).confidence_interval
-    return Effect(mean, float(interval.low), float(interval.high), len(values), count, "")
+        return Sample(values, 0, drawn)
+    _, belongs = np.unique(np.asarray(seeds)[there], return_inverse=True)
+    return Sample(np.bincount(belongs, weights=values) / np.bincount(belongs), len(values), drawn)
 
 
-def varies(values: Array) -> bool:
-    """Whether they differ by more than rounding."""
-    return bool(np.ptp(values) > 1e-9 * max(1.0, float(np.abs(values).max())))
+class Evidence(NamedTuple):
+    """Two-sided p-values: that the mean lies within the bounds, and that it lies outside. Small is evidence."""
+
+    holds: float
+    fails: float
+
+    @property
+    def strongest(self) -> float:
+        return min(self.holds, self.fails)
 
 
-def equivalence(above: Array, below: Array) -> float | None:
-    """The p-value of two one-sided t-tests: that mean(above) <= 0 or mean(below) >= 0.
-
-    `above` holds the pairs' distances from the lower bound, `below` those from the upper one, negative inside; either
-    may be empty for a bound that is not there. None without variation: then there is nothing to test.
-    """
-    tested = [sign * side for side, sign in ((above, 1.0), (below, -1.0)) if len(side)]
-    if any(len(side) < 2 or not varies(side) for side in tested):
-        return None
-    return max(_one_sided(side) for side in tested)
-
-
-def _one_sided(values: Array) -> float:
-    """Of a mean that is not above zero."""
-    n = len(values)
-    t = values.mean() / (values.std(ddof=1) / np.sqrt(n))
-    return float(special.stdtr(n - 1, -t))
+def evidence(of: Sample, low: Array | float | None, high: Array | float | None) -> Evidence:
+    """Whether the mean lies within the bounds, numbers or one for each seed; None for a bound that is not there."""
+    above_low = of.shifted(low) if low is not None else None
+    above_high = of.shifted(high) if high is not None else None
+    inside = [above_low.p_above(0.0)] if above_low else []
+    inside += [above_high.p_below(0.0)] if above_high else []
+    outside = [above_low.p_below(0.0)] if above_low else []
+    outside += [above_high.p_above(0.0)] if above_high else []
+    if of.is_exact:  # on the bound itself a number holds
+        within = (low is None or of.mean >= np.mean(low)) and (high is None or of.mean <= np.mean(high))
+        return Evidence(0.0, 1.0) if within else Evidence(1.0, 0.0)
+    return Evidence(min(1.0, 2.0 * max(inside)), min(1.0, 2.0 * min(outside)))
 
 
 def holm(p: Sequence[float]) -> list[float]:
@@ -99,15 +167,54 @@ def holm(p: Sequence[float]) -> list[float]:
     return [float(value) for value in adjusted]
 
 
-def mcnemar(only_first: int, only_second: int) -> float:
-    """Exact p-value for pairs in which one converges and the other does not."""
-    discordant = only_first + only_second
-    return float(stats.binomtest(only_first, discordant).pvalue) if discordant else 1.0
+def seeds_to_decide(of: Sample, low: float | None, high: float | None, level: float) -> int | None:
+    """How many seeds in all would decide, were mean and scatter to stay as they are; None when `MOST_SEEDS` would not.
+
+    `level` is the two-sided significance that the test has to reach in its family.
+    """
+    if not of.varies:
+        return LEAST_EQUAL if of.seeds < LEAST_EQUAL else None
+    distance = min(abs(of.mean - bound) for bound in (low, high) if bound is not None)
+    spread = float(np.std(of.means, ddof=1))
+    if of.seeds < 3:
+        return LEAST_SEEDS
+    n = np.unique(np.geomspace(max(LEAST_SEEDS, of.seeds + 1), MOST_SEEDS, 400).astype(int))
+    enough = special.stdtrit(0.5 * (n - 1), 1.0 - 0.5 * level) * spread / np.sqrt(n) <= distance
+    return int(n[np.argmax(enough)]) if enough.any() else None
 
 
-def share(number: int, of: int) -> Share:
-    """`number` out of `of`; of nothing, the interval is everything."""
+class Share(NamedTuple):
+    """A proportion of flights with its 95 % interval, seeds as clusters."""
+
+    number: int
+    of: int
+    seeds: int
+    low: float
+    high: float
+
+    @property
+    def share(self) -> float:
+        return self.number / self.of if self.of else math.nan
+
+
+def share(true: NDArray[np.bool_], seeds: NDArray[np.generic], *, drawn: bool) -> Share:
+    """How many of the flights, with an interval.
+
+    Flights of one seed are alike: the interval is Clopper and Pearson's of as many independent flights as the scatter
+    between the seeds' shares allows (the design effect of Kish), of as many as there are seeds at least.
+    """
+    number, of = int(true.sum()), len(true)
     if not of:
-        return Share(0, 0, np.nan, 0.0, 1.0)
-    interval = stats.binomtest(number, of).proportion_ci(CONFIDENCE, "wilson")
-    return Share(number, of, number / of, float(interval.low), float(interval.high))
+        return Share(0, 0, 0, 0.0, 1.0)
+    by_seed = sample(true.astype(float), seeds, drawn=drawn)
+    p, n = number / of, by_seed.seeds
+    if not drawn:
+        return Share(number, of, n, p, p)
+    independent = float(n)
+    scatter = float(np.var(by_seed.means, ddof=1)) if n > 1 else 0.0
+    if scatter > 0.0:
+        independent = min(float(of), max(float(n), p * (1.0 - p) / (scatter / n)))
+    k, tail = p * independent, 0.5 * (1.0 - CONFIDENCE)
+    low = float(stats.beta.ppf(tail, k, independent - k + 1.0)) if number else 0.0
+    high = float(stats.beta.ppf(1.0 - tail, k + 1.0, independent - k)) if number < of else 1.0
+    return Share(number, of, n, low, high)

@@ -1,0 +1,245 @@
+"""A comparison in sentences: each with its condition, its numbers and how many pairs and seeds it rests on."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from harness.metric import METRICS, YES_OR_NO
+from harness.tables import number, table
+from harness.verdict.comparison import Comparison, Scorecard
+from harness.verdict.conditions import Conclusion
+from harness.verdict.judgement import HIGHER, LOWER, Judgement
+from harness.verdict.pairs import UNDISTURBED, shown
+from harness.verdict.parts import PARTS, Group, Part
+from harness.verdict.statistics import Share
+from harness.vocabulary import Verdict
+
+
+def sentences(comparison: Comparison) -> Iterator[str]:
+    """The answer: the question, what was compared, lost flights first, then each airframe."""
+    if comparison.question:
+        yield comparison.question
+    yield from compared(comparison)
+    yield from lost(comparison)
+    for card in comparison.answering:
+        yield ""
+        yield from scorecard(card, comparison)
+
+
+def scorecard(card: Scorecard, comparison: Comparison) -> Iterator[str]:
+    """One airframe: what is said of each part with its worst cell, or of each metric that differs."""
+    lost_flights = f", ended early: {share(card.lost)}" if card.lost.number else ""
+    yield (
+        f"{card.aircraft}: {comparison.by} = {card.value} beside {comparison.baseline}, "
+        f"{counted(card.pairs, 'pair')}, {counted(card.seeds, 'seed')}{lost_flights}"
+    )
+    if not comparison.assumption:
+        yield from (f"  {line}" for line in _changes(card))
+        return
+    headings = ["part", "verdict", "worst cell, 95 % interval", "asked", "where"]
+    rows: list[tuple[str, ...]] = []
+    notes: list[str] = []
+    for group in Group:
+        parts = [part for part in card.parts if part.group is group]
+        rows += [(f"{group}:",)] if parts else []
+        rows += [_row(card, part) for part in parts]
+        notes += [note for part in parts for note in _notes(card, part)]
+    yield from (f"  {line}" for line in table(headings, rows))
+    yield from (f"  {note}" for note in notes)
+
+
+def _row(card: Scorecard, part: Part) -> tuple[str, ...]:
+    conclusion, of = card.conclusion(part.column), worst(card, part)
+    counts = "" if conclusion.of == 1 else f" {conclusion.holds}/{conclusion.of}"
+    if conclusion.fails and conclusion.of > 1:
+        counts += f", fails {conclusion.fails}"
+    same = len({(j.difference, j.bounds) for j in card.of(part.column)}) == 1
+    return f"  {part.title}", f"{conclusion.word}{counts}", value(of), bound(of, part), "" if same else place(of.at)
+
+
+def _notes(card: Scorecard, part: Part) -> Iterator[str]:
+    """Under what condition, what the design cannot tell apart, and why cells are undecided."""
+    conclusion = card.conclusion(part.column)
+    if conclusion.condition:
+        word = "holds" if conclusion.condition.word is Verdict.HOLDS else "fails"
+        yield f"{part.title} {word} if {conclusion.condition.text} ({counted(conclusion.condition.cells, 'cell')})"
+    if conclusion.confounded:
+        together = " and ".join(conclusion.confounded)
+        yield f"{part.title}: {together} vary together, so the design cannot tell which matters"
+    undecided = [j for j in card.of(part.column) if j.word == Verdict.UNDECIDED]
+    if undecided:
+        needed = sorted(j.seeds_needed for j in undecided if j.seeds_needed)
+        advice = f"; {needed[-1]} seeds would decide {'it' if len(undecided) == 1 else 'the last'}" if needed else ""
+        yield f"{part.title} is undecided in {counted(len(undecided), 'cell')}: {undecided[0].why}{advice}"
+
+
+def worst(card: Scorecard, part: Part) -> Judgement:
+    """The cell that takes most of its margin; one that fails before all others."""
+    return max(card.of(part.column), key=lambda judgement: (judgement.word == Verdict.FAILS, judgement.use))
+
+
+def compared(comparison: Comparison) -> Iterator[str]:
+    """What was compared, and what varies."""
+    seeds = comparison.pairs.other["seed"].nunique()
+    varies = ", ".join(f"{axis} ({len(values)})" for axis, values in comparison.axes.items())
+    yield (
+        f"Compared: {comparison.by} = {', '.join(comparison.values)} beside {comparison.baseline}, "
+        f"{counted(len(comparison.pairs), 'pair')}, {counted(seeds, 'seed')}, from "
+        f"{counted(comparison.flights, 'flight')}; varies: {varies or 'nothing else'}."
+    )
+    infeasible = int((comparison.pairs.other["feasibility_margin_deg_s"] < 0.0).sum())
+    if infeasible:
+        yield f"In {counted(infeasible, 'pair')} the heading-rate limit is below what holding the circle takes."
+    astray = int((~comparison.pairs.reference["circles"].astype(bool)).sum())
+    if astray:
+        yield (
+            f"In {counted(astray, 'pair')} the flight of {comparison.baseline} does not circle its target: "
+            "such pairs do not count in what circling costs."
+        )
+    if comparison.unpaired:
+        yield f"{counted(len(comparison.unpaired), 'flight')} could not be compared."
+
+
+def lost(comparison: Comparison) -> Iterator[str]:
+    """Flights that ended early, on both sides: they come before all that is said of the others."""
+    for given, flights in comparison.table.groupby(comparison.by, sort=False):
+        count = int(flights["lost"].sum())
+        if count:
+            yield f"{count} of {len(flights)} flights with {comparison.by} = {shown(given)} ended early."
+
+
+def worded(conclusion: Conclusion) -> str:
+    """A conclusion in words, with its cells."""
+    of = counted(conclusion.of, "cell")
+    match conclusion.word:
+        case Verdict.HOLDS:
+            return "holds" if conclusion.of == 1 else f"holds in all {of}"
+        case Verdict.UNDECIDED:
+            return "is undecided" if conclusion.of == 1 else f"holds in {conclusion.holds} of {of}, the rest undecided"
+        case Verdict.HOLDS_IF if conclusion.condition:
+            return f"holds if {conclusion.condition.text}, fails in {conclusion.fails} of {of}"
+        case _ if conclusion.condition:
+            return f"fails if {conclusion.condition.text}, holds in {conclusion.holds} of {of}"
+    if conclusion.of == 1:
+        return "fails"
+    text = f"fails in {conclusion.fails} of {of}, holds in {conclusion.holds}"
+    if conclusion.confounded:
+        text += f"; {' and '.join(conclusion.confounded)} vary together: the design cannot tell which matters"
+    return text
+
+
+def _changes(card: Scorecard) -> Iterator[str]:
+    """One line per metric that is lower or higher anywhere, and the parts that have a margin."""
+    for column in dict.fromkeys(judgement.column for judgement in card.judgements):
+        judgements = card.of(column)
+        if judgements[0].has_margin:
+            part = PARTS[column]
+            of = worst(card, part)
+            where = f", at {place(of.at)}" if place(of.at) and len(judgements) > 1 else ""
+            yield f"{part.title} {worded(card.conclusion(column))} ({value(of)}, {bound(of, part)} asked{where})."
+            continue
+        higher, lower = (sum(j.word == word for j in judgements) for word in (HIGHER, LOWER))
+        if higher or lower:
+            largest = max((j for j in judgements if j.word in (HIGHER, LOWER)), key=lambda j: abs(j.difference))
+            where = f", at {place(largest.at)}" if place(largest.at) and len(judgements) > 1 else ""
+            counts = f"lower in {lower}, higher in {higher} of {counted(len(judgements), 'cell')}"
+            said = (HIGHER if higher else LOWER) if len(judgements) == 1 else counts
+            yield f"{column}: {said} ({value(largest)}{where})."
+
+
+def place(at: Mapping[str, object]) -> str:
+    """Where a cell is, without what is undisturbed."""
+    return ", ".join(f"{axis} = {shown(v)}" for axis, v in at.items() if UNDISTURBED.get(axis) != v)
+
+
+def missing_flights(comparison: Comparison) -> Iterator[str]:
+    """The flights that would tell apart what varies together, as options to type."""
+    for card in comparison.answering:
+        for part in card.parts:
+            for cell in card.conclusion(part.column).missing:
+                yield " ".join(f"--set {option}" for option in _options(card, cell))
+
+
+def _options(card: Scorecard, cell: Mapping[str, object]) -> Iterator[str]:
+    yield f"aircraft={card.aircraft}"
+    for axis, given in cell.items():
+        if axis == "law":
+            name, _, gains = str(given).partition(" ")
+            yield f"law.name={name}"
+            if gains:
+                yield f"law.gains={gains}"
+        elif axis == "wind_speed_mps":
+            yield f"'wind.steady_mps=[{shown(given)}, 0.0]'"
+        else:
+            yield f"{axis}={shown(given)}"
+
+
+# Numbers
+
+
+def counted(count: int, noun: str) -> str:
+    """So many of a noun."""
+    return f"{count} {noun}{'s' if count != 1 else ''}"
+
+
+def plain(value: float) -> str:
+    """Three digits, or a dash for none."""
+    return number(None if math.isnan(value) else value)
+
+
+def signed(value: float) -> str:
+    """Three digits with a sign, or a dash for none."""
+    text = plain(value)
+    return f"+{text}" if value > 0 and text != "0" else text
+
+
+def interval(low: float, high: float) -> str:
+    """A 95 % interval; nothing where it has no width or there is none."""
+    return "" if math.isnan(low) or low == high else f" [{signed(low)}, {signed(high)}]"
+
+
+def value(judgement: Judgement) -> str:
+    """A difference with its interval and unit."""
+    part = PARTS.get(judgement.column)
+    if part and part.kind == "at least" and judgement.has_margin:
+        text = plain(judgement.difference)
+    else:
+        text = signed(judgement.difference)
+    return f"{text}{interval(judgement.low, judgement.high)}{_unit(judgement.column)}"
+
+
+def bound(judgement: Judgement, part: Part) -> str:
+    """What a difference has to stay within."""
+    low, high = judgement.bounds
+    match part.kind:
+        case "at most":
+            return f"at most {plain(high if high is not None else math.nan)}"
+        case "at least":
+            return f"at least {plain(low if low is not None else math.nan)}"
+        case _:
+            return f"within ±{plain(high if high is not None else math.nan)}"
+
+
+def _unit(column: str) -> str:
+    unit = unit_of(column)
+    return f" {unit}" if unit else ""
+
+
+def unit_of(column: str) -> str:
+    """The unit of a part or a metric; empty for a ratio."""
+    if column in PARTS:
+        return PARTS[column].unit
+    unit = METRICS[column].unit if column in METRICS else ""
+    return "" if unit in ("1", YES_OR_NO) else unit
+
+
+def share(given: Share) -> str:
+    """A share of flights with its interval."""
+    if given.low == given.high:
+        return f"{given.number} of {given.of}"
+    low, high = (f"{100.0 * x:.2g}" if x < 0.095 else f"{100.0 * x:.0f}" for x in (given.low, given.high))
+    return f"{given.number} of {given.of} ({low} to {high} %)"
+
+
+def values(row: Sequence[object]) -> str:
+    """Several values of an axis."""
+    return ", ".join(map(shown, row))

@@ -1,0 +1,45 @@
+"""A comparison for a terminal: the answer, then the parts with their worst cells, then what could not be compared."""
+
+from collections.abc import Iterator
+
+from harness.verdict.answer import counted, missing_flights, scorecard, sentences
+from harness.verdict.comparison import Comparison, Unpaired
+from harness.verdict.pairs import shown
+from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
+
+MOST_LISTED = 10
+
+
+def lines(comparison: Comparison) -> Iterator[str]:
+    """All of it."""
+    yield from sentences(comparison)
+    for card in comparison.scorecards:
+        if card not in comparison.answering:
+            yield ""
+            yield from scorecard(card, comparison)
+    options = list(dict.fromkeys(missing_flights(comparison)))
+    if options:
+        yield ""
+        yield "Flights that would tell apart what varies together:"
+        yield from (f"  {option}" for option in options[:MOST_LISTED])
+    yield from unpaired(comparison.unpaired)
+    yield ""
+    yield (
+        f"Intervals: {100 * CONFIDENCE:.0f} %, of the means of seeds; none below {LEAST_SEEDS} seeds; seeds that all "
+        f"agree count as a number from {LEAST_EQUAL} on. Words: two-sided tests at "
+        f"{comparison.assess.significance:g}, Holm's adjustment over one airframe's parts and cells."
+    )
+
+
+def unpaired(flights: tuple[Unpaired, ...]) -> Iterator[str]:
+    """The flights that could not be compared, and why."""
+    if not flights:
+        return
+    yield ""
+    yield f"{counted(len(flights), 'flight')} could not be compared:"
+    for flight in flights[:MOST_LISTED]:
+        there = {key: v for key, v in flight.settings.items() if v == v}  # a setting of another law is NaN
+        settings = ", ".join(f"{key} = {shown(v)}" for key, v in there.items())
+        yield f"  {flight.key[:12]} {flight.why} ({flight.outcome}): {settings}"
+    if len(flights) > MOST_LISTED:
+        yield f"  and {len(flights) - MOST_LISTED} more (--json lists all)"
