@@ -92,7 +92,7 @@ def until(condition: Callable[[], object], process: subprocess.Popen[str], withi
 
 
 def test_a_parent_killed_at_ten_moments_loses_no_flight_and_flies_none_twice(tmp_path: Path) -> None:
-    file = settings(tmp_path, count=1000, duration=40.0)
+    file = settings(tmp_path, count=250, duration=160.0)
     fly_matrix(file, tmp_path / "undisturbed")
     out, moments = tmp_path / "out", random.Random(4)
     kept: dict[str, int] = {}
@@ -185,7 +185,7 @@ def test_a_flight_that_hangs_is_ended_and_costs_no_other(tmp_path: Path) -> None
 
 def test_a_flight_may_take_twenty_times_its_estimate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.runs.workers.SHORTEST_TIMEOUT", 0.0)
-    file = settings(tmp_path, count=3, duration=2000.0)
+    file = settings(tmp_path, count=3, duration=1000.0)
     matrix = read_matrix(read_settings(file))
     (limit,) = {20.0 * typical_wall_time(matrix.flight(combination)) for combination in matrix.combinations()}
     fly_matrix(file, tmp_path / "out", options=replace(WORKERS, fly=hang, workers=1))
@@ -195,7 +195,7 @@ def test_a_flight_may_take_twenty_times_its_estimate(tmp_path: Path, monkeypatch
 
 
 def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: Path) -> None:
-    file = settings(tmp_path, count=5000, duration=100.0)
+    file = settings(tmp_path, count=500, duration=1000.0)
     process = started(file, tmp_path / "out")
     until(lambda: runs_of(tmp_path / "out"), process)
     begin = time.monotonic()
@@ -211,7 +211,7 @@ def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: P
 
 
 def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:
-    file = settings(tmp_path, count=5000, duration=100.0)
+    file = settings(tmp_path, count=500, duration=1000.0)
     first = started(file, tmp_path / "out")
     try:
         until(lambda: runs_of(tmp_path / "out"), first)
