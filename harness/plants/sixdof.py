@@ -143,8 +143,8 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
         change = _solve(by_pitch, by_elevator, by_throttle, residual)
         share = min(1.0, 0.1 / max(1e-9, *map(abs, change)))  # at most 0.1 rad, 0.1 of the throttle at a time
         x = Trim._make(v - share * d for v, d in zip(x, change, strict=True))
-    found = max(map(abs, _accelerations(fdm, x))) < 1e-8
-    if not (found and 0.0 < x.throttle < 1.0 and abs(x.pitch) < math.pi / 6):
+    is_steady = max(map(abs, _accelerations(fdm, x))) < 1e-8
+    if not (is_steady and 0.0 < x.throttle < 1.0 and abs(x.pitch) < math.pi / 6):
         raise NoTrimError(f"no level trim at {start.airspeed:g} m/s, {start.altitude:g} m high")
     return x
 

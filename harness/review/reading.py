@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class _Held(NamedTuple):
-    """What a file holds of one flight."""
+    """One flight in a recording."""
 
     columns: list[str]
     table: Array
@@ -34,8 +34,8 @@ def read_recording(path: Path, flight: str | None = None) -> "pd.DataFrame":
     import pandas as pd
 
     held = _read(path)
-    one = held[_chosen(path, list(held), flight)]
-    return pd.DataFrame(one.table, columns=one.columns)
+    recorded = held[_chosen(path, list(held), flight)]
+    return pd.DataFrame(recorded.table, columns=recorded.columns)
 
 
 def read_logs(path: Path) -> dict[str, FlightLog]:
@@ -74,11 +74,11 @@ def _read(path: Path) -> dict[str, _Held]:
     rows: dict[str, list[Array]] = {}
     flights: dict[str, str] = {}
     for chunk in chunks:
-        found = re.fullmatch(r"/runs/((?:[^/\\]|\\.)+)/(log|flight)", chunk.entity_path)
-        if not found:
+        entity = re.fullmatch(r"/runs/((?:[^/\\]|\\.)+)/(log|flight)", chunk.entity_path)
+        if not entity:
             continue
-        name, batch = re.sub(r"\\(.)", r"\1", found[1]), chunk.to_record_batch()
-        if found[2] == "flight":
+        name, batch = re.sub(r"\\(.)", r"\1", entity[1]), chunk.to_record_batch()
+        if entity[2] == "flight":
             (flights[name],) = batch.column("TextDocument:text").flatten().to_pylist()
         elif chunk.is_static:
             columns[name] = batch.column("SeriesLines:names").flatten().to_pylist()

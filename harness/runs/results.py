@@ -19,7 +19,7 @@ PARQUET = "flights.parquet"
 _AT_ONCE = 1000  # rows
 _TEXTS = ("key", "outcome", "reason", "digest")
 _NUMBERS = ("feasibility_margin_deg_s", "seconds")
-_STAND = b"journal_changes"  # in the Parquet file's metadata: how far the journal was
+_STAND = b"journal_changes"  # in the Parquet file's metadata: the state of the journal that was exported
 
 
 def load_results(folder: Path | str) -> "pd.DataFrame":
@@ -45,7 +45,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
 
 
 def export(folder: Path) -> None:
-    """Writes the table to flights.parquet, whole or not at all; nothing when no flight was added since."""
+    """Writes the table to flights.parquet, unless no flight was added since; the file is complete or unchanged."""
     import pyarrow.parquet as pq
 
     path = folder / PARQUET
@@ -64,18 +64,18 @@ def _stand(journal: sqlite3.Connection) -> bytes:
 
 
 def _is_current(path: Path, stand: bytes) -> bool:
-    """Whether the exported table has all flights of the journal."""
+    """Whether the exported table holds all flights of the journal."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         return (pq.read_schema(path).metadata or {}).get(_STAND) == stand
     except (OSError, pa.ArrowException):
-        return False  # none, or damaged: the journal has all of it
+        return False  # missing or damaged: the journal holds everything
 
 
 def _exported(path: Path, stand: bytes) -> "pa.Table | None":
-    """What was exported, if no flight was added since."""
+    """The exported table; None if a flight was added since."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -96,35 +96,35 @@ def _table(journal: sqlite3.Connection) -> "pa.Table":
 
 
 def _declared(table: "pa.Table") -> "pa.Table":
-    """The same with every metric there is today, each column of the type it is declared with, and what it is."""
+    """The table with a column for every metric of today; each column has its declared type and metadata."""
     import pyarrow as pa
 
     kinds = {name: pa.bool_() if metric.unit == YES_OR_NO else pa.float64() for name, metric in METRICS.items()}
     for name, kind in (kinds | dict.fromkeys(_NUMBERS, pa.float64())).items():
         if name in table.column_names:
             table = table.set_column(table.column_names.index(name), name, table[name].cast(kind))
-        else:  # flown before there was this metric
+        else:  # the rows are older than this metric
             table = table.append_column(name, pa.nulls(len(table), kind))
     return table.cast(pa.schema([field.with_metadata(_about(field.name)) for field in table.schema]))
 
 
 def _about(column: str) -> dict[str, str]:
-    """What a column of results is, by the declarations: a new result is no setting, whatever its name."""
+    """The metadata of a column, from the declarations: a new result never counts as a setting."""
     if column in METRICS:
         return {"kind": "metric", "unit": METRICS[column].unit, "meaning": METRICS[column].meaning}
     return {"kind": "setting" if is_setting(column) else "result"}
 
 
 def _columns(journal: sqlite3.Connection) -> Iterator[dict[str, list[Any]]]:
-    """The rows, some thousands at a time, column by column."""
-    found = journal.execute(
+    """All rows in blocks of `_AT_ONCE`, each block by columns."""
+    cursor = journal.execute(
         "SELECT key, outcome, reason, digest, feasibility_margin_deg_s, seconds, run, version, settings, metrics "
         "FROM flights ORDER BY position, key"
     )
-    while rows := found.fetchmany(_AT_ONCE):
-        found_rows = [_flat(row) for row in rows]
-        names = dict.fromkeys(name for row in found_rows for name in row)
-        yield {name: [row.get(name) for row in found_rows] for name in names}
+    while rows := cursor.fetchmany(_AT_ONCE):
+        flat_rows = [_flat(row) for row in rows]
+        names = dict.fromkeys(name for row in flat_rows for name in row)
+        yield {name: [row.get(name) for row in flat_rows] for name in names}
 
 
 def _flat(row: tuple[Any, ...]) -> dict[str, Any]:
@@ -151,17 +151,17 @@ def _frame(table: "pa.Table") -> "pd.DataFrame":
 
 
 def mixed_versions(folder: Path) -> list[str]:
-    """What differs between flights of this directory that a comparison would mix, in sentences; empty when nothing.
+    """Sentences on rows of this directory that a comparison would mix although they differ in version.
 
-    Rows of the same law file, inner loop, airframe, target track, physics and libraries can be compared.
+    Rows can be compared when law file, inner loop, airframe, target track, physics and libraries are the same.
     """
     counts: dict[str, dict[str, int]] = {}
     with reading(folder) as journal:
-        found = journal.execute(
+        groups = journal.execute(
             "SELECT v.decides, json_extract(f.settings, '$.aircraft'), json_extract(f.settings, '$.target.track'), "
             "count(*) FROM flights f JOIN versions v ON v.id = f.version GROUP BY 1, 2, 3"
         ).fetchall()
-    for decides, airframe, track, count in found:
+    for decides, airframe, track, count in groups:
         version = json.loads(decides)
         for what, which in (*version.pop("content").items(), *version.items()):
             if which is None:

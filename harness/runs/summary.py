@@ -1,4 +1,4 @@
-"""The table at the end of a run: a line for each combination of the axes, over its seeds."""
+"""The summary at the end of a run: one line for each combination of the axes, over all its seeds."""
 
 import json
 import statistics
@@ -13,12 +13,12 @@ from harness.settings.columns import by_column
 
 
 class Line(NamedTuple):
-    """Flights alike but for what is drawn."""
+    """Flights that differ only in the seed and in what is drawn from it."""
 
     labels: tuple[str, ...]  # the value of each axis
-    outcomes: Mapping[str, int]  # how many flights ended so
-    settled: int  # of them
-    medians: Mapping[str, float | None]  # of those that have the metric; of a yes/no metric the share that says yes
+    outcomes: Mapping[str, int]  # the number of flights by outcome
+    settled: int  # the number of flights that converged
+    medians: Mapping[str, float | None]  # by metric, over the flights that have it; the share of yes for yes or no
 
     @property
     def flights(self) -> int:
@@ -28,13 +28,13 @@ class Line(NamedTuple):
 class Summary(NamedTuple):
     """Results by the axes of a matrix."""
 
-    axes: Sequence[str]  # keys that vary together with commas
+    axes: Sequence[str]  # keys that vary together are joined by commas
     lines: Sequence[Line]  # in the order of the matrix
-    more: int  # lines that are left out
+    more: int  # the number of lines left out
 
 
 def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
-    """The results of the matrix's flights so far, in `most` lines."""
+    """The results of the matrix so far, in at most `most` lines."""
     axes = _axes(matrix)
     keys = [axis.split(", ") for axis in axes]
     groups: dict[tuple[str, ...], _Group] = {}
@@ -49,7 +49,7 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
             columns = by_column(json.loads(settings))
             combination = matrix.at(position)
             columns |= dict.fromkeys(combination.drawn if combination else (), "drawn")
-            labels = tuple(" ".join(_shown(columns.get(key)) for key in together) for together in keys)
+            labels = tuple(" ".join(_text(columns.get(key)) for key in together) for together in keys)
             if labels not in groups and len(groups) == most:
                 left_out.add(labels)
             else:
@@ -74,19 +74,20 @@ class _Group:
 
 
 def _typical(metric: str, values: Sequence[float]) -> float:
+    """The median of a metric's values; of a yes-or-no metric the share of yes."""
     return statistics.fmean(values) if METRICS[metric].unit == YES_OR_NO else statistics.median(values)
 
 
 def _axes(matrix: Matrix) -> list[str]:
-    """Those that vary and are not drawn over."""
+    """The axes that vary, without the seed and without keys that are drawn."""
     several = len(matrix.blocks) > 1  # an included flight may differ from the matrix in a key of one value
     left_out = {"seed", *matrix.draws}
     return [keys for keys, count in matrix.varies.items() if (several or count > 1) and keys not in left_out]
 
 
-def _shown(value: object) -> str:
+def _text(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return f"[{', '.join(map(_shown, value))}]"
+        return f"[{', '.join(map(_text, value))}]"
     return "-" if value is None else str(value)

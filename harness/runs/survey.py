@@ -14,107 +14,108 @@ from harness.settings import SettingsError
 _ROW_BYTES = 4500  # in the journal and in flights.parquet
 _RECORDED_BYTES = 450  # per guidance period, in a recording
 _MOST_MISTAKES = 20
-_MOST_STARTS = 200  # that are tried out before flying; more, and what cannot start becomes a row
+_MOST_STARTS = 200  # tried before the run; beyond it, a flight that cannot start becomes a row of the run
 
 
 @dataclass(slots=True)
 class Survey:
-    """The size of a matrix. Counts are of flights."""
+    """The size and the warnings of a matrix. Counts are of flights."""
 
     flights: int = 0
-    random: int = 0  # whose seed matters
-    seconds: float = 0.0  # estimated, of one process
+    random: int = 0  # flights whose seed matters
+    seconds: float = 0.0  # estimated wall time of one process
     periods: int = 0  # guidance periods, of all flights together
     mistakes: list[str] = field(default_factory=list)
     varies: dict[str, int] = field(default_factory=dict)  # the number of values of each axis
-    warnings: dict[str, int] = field(default_factory=dict)  # how many flights each is about
+    warnings: dict[str, int] = field(default_factory=dict)  # with the number of flights that each is about
 
     @property
     def idle_seeds(self) -> int:
-        """How many seeds there are that change nothing; 0 when they do, or there is one."""
+        """The number of seeds, if there are several and none of them changes a flight; otherwise 0."""
         seeds = self.varies.get("seed", 1)
         return seeds if seeds > 1 and self.flights and not self.random else 0
 
 
-def disk(found: Survey, recorded: int) -> float:
-    """Bytes of the results, when so many flights are recorded."""
-    each = found.periods / found.flights * _RECORDED_BYTES if found.flights else 0.0
-    return found.flights * _ROW_BYTES + min(recorded, found.flights) * each
+def disk(total: Survey, recorded: int) -> float:
+    """The size of the results in bytes, with `recorded` flights recorded."""
+    each = total.periods / total.flights * _RECORDED_BYTES if total.flights else 0.0
+    return total.flights * _ROW_BYTES + min(recorded, total.flights) * each
 
 
 def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = frozenset()) -> Iterator[Survey]:
-    """Goes through the matrix but for what is done, and yields the survey so far now and then, at last the whole.
+    """Checks all flights of the matrix except those at the positions `done`.
 
-    Raises `SettingsError` at the end with the mistakes that it found.
+    Yields the survey so far every 500 flights, and the complete survey at the end. Raises `SettingsError` at the end
+    with all mistakes, or after the first `_MOST_MISTAKES`.
     """
-    found = Survey(varies={key: count for key, count in matrix.varies.items() if count > 1})
+    total = Survey(varies={key: count for key, count in matrix.varies.items() if count > 1})
     seen, starts = _Seen(), set[object]()
     for position in range(matrix.positions):
-        if limit is not None and found.flights >= limit:
+        if limit is not None and total.flights >= limit:
             break
         if position in done:
-            found.flights += 1
+            total.flights += 1
             continue
         combination = matrix.at(position)
         if combination is None:
             continue
-        found.flights += 1
+        total.flights += 1
         try:
-            one = seen.get(matrix, combination)
-            if one.start not in starts and len(starts) < _MOST_STARTS:
-                starts.add(one.start)
+            flight = seen.get(matrix, combination)
+            if flight.start not in starts and len(starts) < _MOST_STARTS:
+                starts.add(flight.start)
                 _try_start(matrix, combination)
         except SettingsError as error:
-            found.mistakes += [line for line in error.lines if line not in found.mistakes]
-            if len(found.mistakes) >= _MOST_MISTAKES:
+            total.mistakes += [line for line in error.lines if line not in total.mistakes]
+            if len(total.mistakes) >= _MOST_MISTAKES:
                 break
             continue
-        for warning in one.warnings:
-            found.warnings[warning] = found.warnings.get(warning, 0) + 1
-        found.random += one.random or bool(matrix.draws)
-        found.seconds += one.seconds
-        found.periods += one.periods
-        if found.flights % 500 == 0:
-            yield found
-    if found.mistakes:
-        more = ["... and perhaps more"] if len(found.mistakes) >= _MOST_MISTAKES else []
-        raise SettingsError([*found.mistakes[:_MOST_MISTAKES], *more])
-    yield found
+        for warning in flight.warnings:
+            total.warnings[warning] = total.warnings.get(warning, 0) + 1
+        total.random += flight.random or bool(matrix.draws)
+        total.seconds += flight.seconds
+        total.periods += flight.periods
+        if total.flights % 500 == 0:
+            yield total
+    if total.mistakes:
+        more = ["... and perhaps more"] if len(total.mistakes) >= _MOST_MISTAKES else []
+        raise SettingsError([*total.mistakes[:_MOST_MISTAKES], *more])
+    yield total
 
 
 @dataclass(frozen=True, slots=True)
-class _One:
-    """What one flight comes to."""
+class _FlightSurvey:
+    """The survey of one flight."""
 
     warnings: tuple[str, ...]
     random: bool
     seconds: float
     periods: int
-    start: object  # equal for flights that start alike
+    start: object  # equal for flights that have the same start
 
 
 class _Seen:
-    """Flights that differ in the seed alone come to the same, so they are looked at once."""
+    """Surveys by settings without the seed: flights that differ in the seed alone are surveyed once."""
 
     def __init__(self) -> None:
-        self._known: dict[str, _One] = {}
+        self._known: dict[str, _FlightSurvey] = {}
         self._seeds: set[object] = set()
 
-    def get(self, matrix: Matrix, combination: Combination) -> _One:
+    def get(self, matrix: Matrix, combination: Combination) -> _FlightSurvey:
         seed = repr(combination.values.get("seed"))
         if matrix.draws or "seed" not in combination.values:
-            return _one(matrix.flight(combination))
+            return _flight_survey(matrix.flight(combination))
         others = repr([(key, value) for key, value in combination.values.items() if key != "seed"])
         if others not in self._known or seed not in self._seeds:
-            self._known[others] = _one(matrix.flight(combination))
+            self._known[others] = _flight_survey(matrix.flight(combination))
             self._seeds.add(seed)
         return self._known[others]
 
 
-def _one(flight: Flight) -> _One:
+def _flight_survey(flight: Flight) -> _FlightSurvey:
     random = flight.estimator.filters or flight.wind.turbulence != "none"
     start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
-    return _One(tuple(warnings(flight)), random, typical_wall_time(flight), flight.periods, start)
+    return _FlightSurvey(tuple(warnings(flight)), random, typical_wall_time(flight), flight.periods, start)
 
 
 def _try_start(matrix: Matrix, combination: Combination) -> None:
