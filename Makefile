@@ -32,11 +32,11 @@ models: install  ## write the JSBSim models from the airframes' data
 identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
 	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name || exit 1; done
 
-paper: install  ## the paper's numbers, figures and claims under docs/, on the airframes too (a quarter of an hour)
-	$(BIN)/harness reproduce --out docs --sixdof
-	$(BIN)/python -m harness.studies.paper.coefficients docs/answers/fitted.md
+paper: install  ## the paper's numbers, figures and claims under docs/answers, on the airframes too (a quarter of an hour)
+	$(BIN)/harness reproduce --out docs/answers --sixdof
+	$(BIN)/python -m harness.studies.fitted
 
-turbulence: install  ## fly the airframes in turbulence: docs/turbulence.md (five minutes on two processors)
+turbulence: install  ## fly the airframes in turbulence: docs/answers/turbulence.md (five minutes on two processors)
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/moderate --log none
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/unturned --log none --set wind.rotation=false --limit 60
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90

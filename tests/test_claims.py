@@ -1,5 +1,7 @@
 """The ledger of claims: the committed documents say what the experiments say, however they are shared out."""
 
+import csv
+import math
 import os
 import re
 import signal
@@ -15,79 +17,75 @@ import pytest
 
 from harness.flight import Flight
 from harness.loop import simulate
+from harness.pool import computed
+from harness.studies.fitted import BETA2, COARSE, FINE, map_csv, pair_of, unfitted_rows
 from harness.studies.paper.airframes import FLOWN_ON
 from harness.studies.paper.claims import CLAIMS
 from harness.studies.paper.columns import AIRFRAMES, COLUMNS, CONDITIONS, GRID, Column, column, scaled
-from harness.studies.paper.documents import airframes_markdown, row
+from harness.studies.paper.decision import Decision, decide, every, less
+from harness.studies.paper.documents import FORMULAS, HEADINGS, airframes_page, claims_csv, claims_page
 from harness.studies.paper.experiments import LAWS, Reading, flight
-from harness.studies.paper.job import Part, computed, flown_claims, theory
-from harness.studies.paper.ledger import Finding, Findings, Flown, Verdict, decided, holds, holds_if
+from harness.studies.paper.job import Reproduction, flown_claims, theory
+from harness.studies.paper.ledger import Decisions, FlownClaim, TheoryClaim, decided
+from harness.vocabulary import Verdict
 from harness.world.wind import Wind
+from tests.builders import DOCS
 
-DOCS = Path(__file__).parent.parent / "docs"
-FLOWN = [claim for claims in CLAIMS.values() for claim in claims if isinstance(claim, Flown)]
+ANSWERS = DOCS / "answers"
+FLOWN = [claim for claims in CLAIMS.values() for claim in claims if isinstance(claim, FlownClaim)]
 
 
 @pytest.fixture(scope="module")
-def on_airframes() -> Findings:
-    """What the committed ledger of the airframes says."""
-    findings = {}
-    key = ""
-    for line in (DOCS / "claims_sixdof.md").read_text(encoding="utf-8").splitlines():
-        key = line.split()[1] if line.startswith("### ") else key
-        condition, *cells = (cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1] or [""])
-        if key and condition in CONDITIONS:
-            for aircraft, cell in zip(FLOWN_ON, cells, strict=True):
-                findings[key, column(condition, aircraft).name] = _finding(cell)
-    return findings
-
-
-def _finding(cell: str) -> Finding:
-    match = re.fullmatch(r"\*\*(.*?)\*\*(.*)", cell, re.DOTALL)
-    assert match
-    verdict, rest = match.groups()
-    condition, number = rest.split(": ", 1)
-    return Finding(Verdict(verdict), number, condition.strip())
+def committed() -> Decisions:
+    """What the committed ledger says."""
+    with (ANSWERS / "claims.csv").open(encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert tuple(lines[0]) == HEADINGS
+    return {
+        (line["claim"], line["decided by"].replace(FORMULAS, "")): Decision(
+            Verdict(line["verdict"]), line["numbers"], line["condition"]
+        )
+        for line in lines
+    }
 
 
 @pytest.mark.parametrize("title", CLAIMS)
-def test_the_ledger_says_what_its_experiments_say(title: str, on_airframes: Findings) -> None:
-    """All of them are run anew on the paper's aircraft; what is said of the airframes is what their ledger says."""
-    committed = (DOCS / "claims.md").read_text(encoding="utf-8").splitlines()
-    claims = CLAIMS[title]
-    findings = {key: found for each in (None, *COLUMNS) for key, found in decided(claims, each).items()}
-    assert f"## {title}" in committed
-    for claim in claims:
-        assert row(claim, {**findings, **on_airframes}) in committed
+def test_the_ledger_says_what_its_experiments_say(title: str, committed: Decisions) -> None:
+    """All of them are run anew, on the paper's aircraft."""
+    for each in (None, *COLUMNS):
+        for key, decision in decided(CLAIMS[title], each).items():
+            assert decision == committed[key], key
 
 
-def test_the_ledger_of_the_airframes_has_every_claim_in_every_column(on_airframes: Findings) -> None:
-    assert set(on_airframes) == {(claim.key, each.name) for claim in FLOWN for each in GRID}
+def test_the_ledger_has_every_claim_in_every_column(committed: Decisions) -> None:
+    theories = {(c.key, "") for claims in CLAIMS.values() for c in claims if isinstance(c, TheoryClaim)}
+    assert set(committed) == theories | {(claim.key, each.name) for claim in FLOWN for each in (*COLUMNS, *GRID)}
 
 
-def test_the_ledger_of_the_airframes_is_what_its_findings_make_it(on_airframes: Findings) -> None:
-    assert (DOCS / "claims_sixdof.md").read_text(encoding="utf-8") == airframes_markdown(CLAIMS, on_airframes)
+def test_the_pages_are_what_their_decisions_make_them(committed: Decisions) -> None:
+    assert (ANSWERS / "claims.csv").read_text(encoding="utf-8") == claims_csv(CLAIMS, committed)
+    assert (ANSWERS / "claims.md").read_text(encoding="utf-8") == claims_page(CLAIMS, committed)
+    assert (ANSWERS / "claims_sixdof.md").read_text(encoding="utf-8") == airframes_page(CLAIMS, committed)
 
 
 @pytest.mark.parametrize("each", GRID, ids=lambda each: each.name)
-def test_the_ledger_of_the_airframes_says_what_its_experiments_say(each: Column, on_airframes: Findings) -> None:
+def test_the_ledger_of_the_airframes_says_what_its_experiments_say(each: Column, committed: Decisions) -> None:
     """Two of its claims are flown anew, in every column; `make paper` flies them all."""
     some = [claim for claim in FLOWN if claim.key in ("2.1c", "4.1a")]
-    for key, finding in decided(some, each).items():
-        assert finding == on_airframes[key]
+    for key, decision in decided(some, each).items():
+        assert decision == committed[key]
 
 
-def test_the_committed_page_holds_the_ledger_and_fetches_nothing() -> None:
-    page = (DOCS / "paper.html").read_text(encoding="utf-8")
-    found = re.findall(r"<td[^>]*>(.*?)(?=<td|</tr>)", page, re.DOTALL)
-    cells = {unescape(re.sub(r"<[^>]+>", "", cell)).strip() for cell in found}
-    ledger = (DOCS / "claims.md").read_text(encoding="utf-8")
-    rows = [
-        re.split(r" (?<!\\)\| ", line.strip("| ")) for line in ledger.splitlines() if re.match(r"\| \d\S* \|", line)
-    ]
-    assert len(rows) == sum(map(len, CLAIMS.values()))
-    for cell in (cell for each in rows for cell in each[2:]):
-        assert cell.replace("**", "").replace("\\|", "|") in cells
+def test_the_committed_page_holds_the_ledger_and_fetches_nothing(committed: Decisions) -> None:
+    page = (ANSWERS / "paper.html").read_text(encoding="utf-8")
+    cells = {
+        unescape(re.sub(r"<[^>]+>", "", cell)).strip()
+        for cell in re.findall(r"<td[^>]*>(.*?)(?=<td|</tr>)", page, re.DOTALL)
+    }
+    on_the_page = {"", *(each.name for each in COLUMNS)}
+    for (_, name), decision in committed.items():
+        if name in on_the_page:
+            assert str(decision).replace("**", "") in cells
     assert re.findall(r"(?:src|href)\s*=\s*[\"']?(?!#)([^\"'> ]+)|url\((?!#)([^)]+)\)", page) == []
     assert len(page) < 3_000_000
 
@@ -104,11 +102,22 @@ def test_keys_are_unique_and_in_the_papers_order() -> None:
         assert [c.key for c in claims] == sorted(c.key for c in claims), title
 
 
-def test_a_claim_holds_under_its_condition_or_not_at_all() -> None:
-    assert str(holds(True, "3 m")) == "**holds**: 3 m"
-    assert str(holds(False, "3 m")) == "**does not hold**: 3 m"
-    assert str(holds_if("it is calm", True, "3 m")) == "**holds if** it is calm: 3 m"
-    assert holds_if("it is calm", False, "3 m") == Finding(Verdict.NOT, "3 m")
+def test_a_decision_has_one_of_four_verdicts_and_says_which() -> None:
+    assert str(decide(True, "3 m")) == "**holds**: 3 m"
+    assert str(decide(False, "3 m")) == "**fails**: 3 m"
+    assert str(decide(None, "3 m")) == "**undecided**: 3 m"
+    assert str(decide(False, "3 m", under={"it is calm": True})) == "**holds if** it is calm: 3 m"
+    assert decide(True, "3 m", under={"it is calm": False}).verdict is Verdict.HOLDS
+    assert decide(False, "3 m", under={"it is calm": False}).verdict is Verdict.FAILS
+    assert decide(False, "3 m", under={"it is calm": None}).verdict is Verdict.UNDECIDED
+    assert decide(None, "3 m", under={"it is calm": True}).verdict is Verdict.UNDECIDED
+
+
+def test_a_missing_number_is_no_answer_unless_another_number_decides() -> None:
+    assert less(1.0, None) is less(math.nan, 1.0) is None
+    assert every(True, None) is None
+    assert every(False, None) is False
+    assert every(True, less(1.0, 2.0)) is True
 
 
 def test_a_column_flies_what_it_changes_and_nothing_else() -> None:
@@ -164,23 +173,23 @@ def _doomed(one: Flight) -> Flight:
 def test_a_flight_that_ends_early_decides_against_the_claim_and_is_told() -> None:
     doomed = Column("doomed", "", _doomed, 1.0, aircraft="ultra_stick_25e", period=0.05, periods=(0.5,))
     some = [claim for claim in FLOWN if claim.key in ("0a", "2.1a", "2.2e", "4a")]
-    found = {key: finding for (key, _), finding in decided(some, doomed).items()}
-    assert {finding.verdict for finding in found.values()} == {Verdict.NOT}
-    assert re.match(r"the flight of NFTSM over 330 s ended: ground after \d+\.\d s", found["0a"].number)
-    assert re.match(r"the flight of NFTSM over 80 s ended: ground after", found["2.1a"].number)
-    assert found["2.2e"].number == "never within 1 m of the circle, at rest neither"
+    decisions = {key: decision for (key, _), decision in decided(some, doomed).items()}
+    assert {decision.verdict for decision in decisions.values()} == {Verdict.FAILS}
+    assert re.match(r"the flight of NFTSM over 330 s ended: ground after \d+\.\d s", decisions["0a"].number)
+    assert re.match(r"the flight of NFTSM over 80 s ended: ground after", decisions["2.1a"].number)
+    assert "not at 0.1 m/s" in decisions["2.2e"].number
 
 
 def test_two_processes_find_what_one_finds() -> None:
     section = "3.1 Loitering algorithm"
     jobs = [theory, flown_claims(section, COLUMNS[1])]
-    alone, shared = (_findings(list(computed(jobs, workers))) for workers in (1, 2))
+    alone, shared = (_decisions(list(computed(jobs, workers))) for workers in (1, 2))
     assert alone == shared
-    assert any(isinstance(claim, Flown) and (claim.key, COLUMNS[1].name) in alone for claim in CLAIMS[section])
+    assert any(isinstance(claim, FlownClaim) and (claim.key, COLUMNS[1].name) in alone for claim in CLAIMS[section])
 
 
-def _findings(parts: list[Part]) -> dict[tuple[str, str], Finding]:
-    return {key: finding for part in parts for key, finding in part.findings.items()}
+def _decisions(parts: list[Reproduction]) -> dict[tuple[str, str], Decision]:
+    return {key: decision for part in parts for key, decision in part.decisions.items()}
 
 
 def test_an_interrupt_ends_it_with_130_and_leaves_no_file_and_no_process(tmp_path: Path) -> None:
@@ -207,12 +216,11 @@ def _gone(group: int) -> bool:
 
 
 def test_the_coefficients_document_says_what_the_flights_say() -> None:
-    """The fitted and unfitted numbers in full, one row of the map; that no other pair fits is left to `make paper`."""
-    from harness.studies.paper.coefficients import BETA2, COARSE, FINE, map_row, point, unfitted_rows
-
-    committed = (DOCS / "answers" / "fitted.md").read_text(encoding="utf-8").splitlines()
-    for line in unfitted_rows():
-        assert line in committed
-    assert map_row(0.4, [point((0.4, beta2, COARSE)) for beta2 in BETA2]) in committed
-    assert point((0.4, 2.4, FINE)).prints
-    assert not point((0.5, 3.0, FINE)).prints
+    """The fitted and unfitted numbers in full, a row of the map; that no other pair fits is left to `make paper`."""
+    page = (ANSWERS / "fitted.md").read_text(encoding="utf-8").splitlines()
+    for row in unfitted_rows():
+        assert f"| {' | '.join(row)} |" in page
+    flown = map_csv([pair_of((0.4, beta2, COARSE)) for beta2 in BETA2]).splitlines()
+    assert set(flown) <= set((ANSWERS / "fitted.csv").read_text(encoding="utf-8").splitlines())
+    assert pair_of((0.4, 2.4, FINE)).prints
+    assert not pair_of((0.5, 3.0, FINE)).prints

@@ -19,7 +19,7 @@ from harness.knowledge import Estimation, sensor
 from harness.log import COLUMNS, FlightLog
 from harness.loop import command, observe, simulate
 from harness.plants.plant import Outcome
-from harness.studies.estimator import MEASURED, STATES, band, cases, examine, fitting_case, moving, table_row
+from harness.studies.estimator import MEASURED, STATES, assessed, band, cases, examine, fitting_case, moving, table_row
 from harness.world.randomness import stream
 from harness.world.target import Segment, Target, TargetState
 from tests.builders import DOCS, FLIGHT, OwnLaw, python, turning
@@ -144,9 +144,9 @@ def test_a_turn_that_the_model_does_not_know_is_an_error_that_the_filter_does_no
 
 
 def test_the_documents_table_is_what_the_command_prints() -> None:
-    lines = (DOCS / "estimator.md").read_text(encoding="utf-8").splitlines()
+    lines = (DOCS / "answers" / "estimator.md").read_text(encoding="utf-8").splitlines()
     for case in (cases()[0], cases()[4]):
-        assert table_row(case) in lines
+        assert table_row(assessed(case)) in lines
 
 
 def test_the_noise_has_its_variances_and_is_white() -> None:

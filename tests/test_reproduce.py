@@ -9,7 +9,7 @@ import pytest
 
 from harness.studies.paper.experiments import EXPERIMENTS, NEITHER, NO_ACCELERATION, Reading, flight, flown
 from harness.studies.paper.figures import LAWS_DRAWN, sketch
-from harness.studies.paper.job import Part, theory
+from harness.studies.paper.job import Reproduction, theory
 from harness.studies.paper.measures import delay, restricted, settled
 from harness.studies.paper.page import page
 from harness.studies.paper.reproduce import (
@@ -107,7 +107,9 @@ def test_the_page_holds_everything_and_is_the_same_each_time() -> None:
         for experiment in EXPERIMENTS
         for law in LAWS_DRAWN
     }
-    everything = Part([Reproduced(TABLE_3[0], 31.2, True, dict.fromkeys(VARIANTS))], sketches, theory().findings)
+    everything = Reproduction(
+        [Reproduced(TABLE_3[0], 31.2, True, dict.fromkeys(VARIANTS))], sketches, theory().decisions
+    )
     text = page(everything)
     for number in range(2, 11):
         assert re.search(rf"Figures? (\d+ and )?{number}\D", text), number

@@ -270,7 +270,7 @@ def test_jsbsims_own_dryden_filters_have_the_same_spectra() -> None:
 
 @pytest.mark.parametrize(("name", "airspeed"), [("ultra_stick_25e", 13.0), ("skywalker_x8", 13.0), ("aerosonde", 25.0)])
 def test_an_airframe_survives_moderate_turbulence(name: str, airspeed: float) -> None:
-    """A small part of `make turbulence`: docs/turbulence.md has 200 flights of 300 s."""
+    """A small part of `make turbulence`: docs/answers/turbulence.md has 200 flights of 300 s."""
     flight = Flight(
         plant="sixdof",
         aircraft=name,
@@ -285,7 +285,7 @@ def test_an_airframe_survives_moderate_turbulence(name: str, airspeed: float) ->
 
 def test_the_document_has_200_flights_of_each_airframe_in_moderate_turbulence_and_95_percent_survive() -> None:
     """What `make turbulence` flew last; once it found no place for its table and said nothing."""
-    text = (DOCS / "turbulence.md").read_text(encoding="utf-8")
+    text = (DOCS / "answers" / "turbulence.md").read_text(encoding="utf-8")
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| moderate | ")]
     assert sorted(row[1].split(",")[0] for row in rows) == ["aerosonde", "skywalker_x8", "ultra_stick_25e"]
     for row in rows:

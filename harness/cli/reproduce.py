@@ -16,8 +16,8 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     """Fly the paper's simulations and check its claims.
 
     Prints the numbers of the paper beside ours, then each claim with its verdict. OUT/paper.html holds both with the
-    figures, OUT/claims.md the claims alone; with --sixdof OUT/claims_sixdof.md holds the claims on the airframes.
-    Takes two to five minutes.
+    figures, OUT/claims.md says what is left of the claims, OUT/claims.csv gives each claim with its numbers; with
+    --sixdof OUT/claims_sixdof.md says what is left of them on the airframes. Takes two to five minutes.
 
     \b
     Examples:
@@ -33,14 +33,18 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     from harness.studies.paper.page import page
 
     folder = writable_folder(out)
-    html, document = writable(folder / "paper.html"), writable(folder / "claims.md")
+    html, document, table = (writable(folder / name) for name in ("paper.html", "claims.md", "claims.csv"))
     on_airframes = writable(folder / "claims_sixdof.md") if sixdof else None
     todo = job.jobs(airframes=sixdof)
     with progress("flying the paper", len(todo)) as advance:
         everything = job.everything(todo, workers or job.workers(), advance)
-    written = {html: page(everything), document: documents.markdown(CLAIMS, everything.findings)}
+    written = {
+        html: page(everything),
+        document: documents.claims_page(CLAIMS, everything.decisions),
+        table: documents.claims_csv(CLAIMS, everything.decisions),
+    }
     if on_airframes:
-        written[on_airframes] = documents.airframes_markdown(CLAIMS, everything.findings)
+        written[on_airframes] = documents.airframes_page(CLAIMS, everything.decisions)
     for path, text in written.items():
         with replacing(path) as partial:
             partial.write_text(text, encoding="utf-8")
@@ -50,8 +54,8 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     for line in numbers.moved(everything.numbers):
         click.echo(line)
     click.echo("\nThe claims:")
-    for line in ledger.told(CLAIMS, everything.findings):
+    for line in ledger.ledger_lines(CLAIMS, everything.decisions):
         click.echo(line)
-    click.echo(f"\nfigures and claims: {html}\nclaims: {document}")
+    click.echo(f"\nfigures and claims: {html}\nclaims: {document}, each with its numbers: {table}")
     if on_airframes:
         click.echo(f"claims on the airframes: {on_airframes}")

@@ -5,11 +5,7 @@ memory which flight of its chunk it flies and since when. So a death or a hang l
 chunk is flown again.
 """
 
-import multiprocessing
-import os
 import pickle
-import signal
-import threading
 import time
 import zlib
 from collections import deque
@@ -21,22 +17,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pebble import ProcessExpired, ProcessPool
-from pebble.pool.process import WORKERS_NAME
 
 from harness.error import HarnessError
 from harness.flight import Flight
 from harness.key import version_of
 from harness.plants.plant import Outcome
+from harness.pool import SPAWN, ended, started
 from harness.runs.row import FlightResult, failed_result, result_of, simulate_safely
 from harness.runs.wall_time import CHUNK, WallTime
 
-THREADS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
 AHEAD = 2  # chunks sent out per worker: one is flown, one waits
 SHORTEST_TIMEOUT = 10.0  # s: with a shorter one, flights would time out because the machine is busy
 _RECORDING = 60.0  # s added to the timeout of a flight that is recorded
@@ -45,7 +34,6 @@ _MOST_RESTARTS = 3  # of the workers, with no flight done in between
 _MOST_TASKS = 64  # in a chunk
 _PIPE = 48_000  # bytes of waiting messages: a full pipe blocks this process, for ever if all workers are dead
 _NONE = -1  # no flight of the chunk has begun
-_SPAWN = multiprocessing.get_context("spawn")
 
 
 class WorkersError(HarnessError):
@@ -140,7 +128,7 @@ class _Flying:
         # For each slot: which flight of its chunk is flown, and since when (all processes share the monotonic clock).
         # A worker that is being ended may still write to its slot, so a slot is reused as late as possible.
         slots = 16 * AHEAD * workers
-        self.begun = _SPAWN.RawArray("d", 2 * slots)
+        self.begun = SPAWN.RawArray("d", 2 * slots)
         self.slots = deque(range(slots))
         self.pool = self._pool()
         self.restarts = 0  # since a flight was done
@@ -162,29 +150,12 @@ class _Flying:
                 elif time.monotonic() - self.moved > _STALLED:  # a worker was killed while it held the lock they share
                     self._restart()
         finally:
-            self._stop()
+            ended(self.pool)
 
     def _pool(self) -> ProcessPool:
-        for name in THREADS:  # before the spawn: a library reads it when it is loaded
-            os.environ[name] = "1"
-        # Threads and processes started here ignore Ctrl-C, which this thread handles.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            pool = ProcessPool(
-                self.workers, initializer=_prepare, initargs=(self.begun, self.folder, self.fly), context=_SPAWN
-            )
-            assert pool.active  # asking starts it
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        pool = started(self.workers, _prepare, (self.begun, self.folder, self.fly))
         self.moved = time.monotonic()
         return pool
-
-    def _stop(self) -> None:
-        self.pool.stop()  # type: ignore[no-untyped-call]
-        for child in multiprocessing.active_children():
-            if child.name == WORKERS_NAME:
-                child.kill()
-        self.pool.join()
 
     def _restart(self) -> None:
         """Replaces all workers; the chunks of the old ones are flown again."""
@@ -194,7 +165,7 @@ class _Flying:
                 "the worker processes end as soon as they are started; a Python script must call harness.run under "
                 '`if __name__ == "__main__":`'
             )
-        self._stop()
+        ended(self.pool)
         for chunk in self.out.values():
             self.slots.append(chunk.slot)
             self.again.append(chunk)
@@ -293,15 +264,6 @@ _SHARED: dict[str, Any] = {}  # set once per process by `_prepare`
 
 def _prepare(begun: Any, folder: Path, fly: Fly) -> None:
     _SHARED.update(begun=begun, folder=folder, fly=fly)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Ends this worker as soon as its parent has ended, because nobody waits for its flight."""
-    parent = multiprocessing.parent_process()
-    assert parent
-    parent.join()
-    os._exit(1)
 
 
 def _fly_chunk(slot: int, message: bytes) -> list[WorkerResult | str]:

@@ -1,4 +1,4 @@
-"""Is the estimator as sure as it ought to be? `python -m harness.studies.estimator [SEEDS]`: NEES and NIS.
+"""Is the estimator as sure as it ought to be? `python -m harness.studies.estimator` writes the page estimator.md.
 
 NEES, the error of the state squared over its covariance, is 4 on average for a filter that is as good as it believes
 itself, NIS, the same of the innovation, 2; more is overconfidence. The average over the seeds at one moment lies within
@@ -6,20 +6,23 @@ the band of its chi-square distribution 95 % of the time (Bar-Shalom, Li & Kirub
 """
 
 import math
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
+import click
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from autopilot.estimator import Estimator, ekf
 from harness.knowledge import sensor
-from harness.studies.paper.experiments import EXPERIMENTS
+from harness.studies.command import counted, out_option, run, write
+from harness.studies.paper.experiments import EXPERIMENTS, STRAIGHT
+from harness.template import template
 from harness.world.randomness import stream
-from harness.world.target import Segment, Target, TargetState
+from harness.world.target import Target, TargetState
 
 Array = NDArray[np.float64]
 
@@ -27,7 +30,7 @@ SEEDS = 200
 STATES, MEASURED = 4, 2  # numbers in X and in Z
 
 
-class Case(NamedTuple):
+class EstimatorCase(NamedTuple):
     """A target under a filter: `motion` gives, by the seed, its states at the sampling times, rows (x, x', y, y')."""
 
     name: str
@@ -50,13 +53,13 @@ def band(numbers: int, seeds: int) -> tuple[float, float]:
     return low, high
 
 
-def examine(case: Case, seeds: int = SEEDS) -> Consistency:
+def examine(case: EstimatorCase, seeds: int = SEEDS) -> Consistency:
     """Runs the filter on the case with every seed."""
     runs = [_run(case, seed) for seed in range(seeds)]
     return Consistency._make(np.array(rows) for rows in zip(*runs, strict=True))
 
 
-def _run(case: Case, seed: int) -> tuple[Array, Array, Array, Array]:
+def _run(case: EstimatorCase, seed: int) -> tuple[Array, Array, Array, Array]:
     truth = case.motion(seed)
     measure, tracker = sensor(case.estimator, seed), ekf(case.estimator)
     states, covariances, nis = [], [], []
@@ -101,67 +104,108 @@ def moving(target: Target, estimator: Estimator, duration: float) -> Callable[[i
 
 
 PAPER = Estimator(kind="ekf")
-SLOW = Target(speed=2.0, heading=math.radians(-45.0))
-_QUARTER = math.radians(90.0) / 250.0
-S_SHAPE = Target(
-    speed=2.0,
-    heading=math.radians(-45.0),
-    segments=(
-        Segment(from_=0.0, to=250.0, turn_rate=_QUARTER),
-        Segment(from_=250.0, to=750.0, turn_rate=-_QUARTER),
-        Segment(from_=750.0, to=1000.0, turn_rate=_QUARTER),
-    ),
-)
-MANOEUVRING = EXPERIMENTS["manoeuvres"].target
 
 
-def fitting_case(distance: float, known: bool) -> Case:
+def fitting_case(distance: float, known: bool) -> EstimatorCase:
     """30 s of targets that fit, north-east of the sensor; the start known to 1 m and 0.5 m/s, or measured."""
     start = (distance * math.sqrt(0.5), distance * math.sqrt(0.5))
     estimator = replace(PAPER, initial_position=start, initial_velocity_variance=0.25) if known else PAPER
     how = "known start" if known else "first measurement"
-    return Case(f"fits, {distance:g} m away, {how}", estimator, fitting(estimator, start, 60))
+    return EstimatorCase(f"fits, {distance:g} m away, {how}", estimator, fitting(estimator, start, 60))
 
 
-def cases() -> list[Case]:
+def cases() -> list[EstimatorCase]:
     """Those of the table."""
     return [
         *(fitting_case(distance, True) for distance in (14.0, 100.0, 1000.0, 4000.0)),
         *(fitting_case(distance, False) for distance in (14.0, 100.0, 1000.0, 4000.0)),
-        Case("stationary (4.1), 100 s", PAPER, moving(Target(), PAPER, 100.0)),
-        Case("2 m/s straight, 300 s", PAPER, moving(SLOW, PAPER, 300.0)),
-        Case("2 m/s in an S (4.2), 1000 s", PAPER, moving(S_SHAPE, PAPER, 1000.0)),
-        Case("manoeuvring (4.3), 600 s", PAPER, moving(MANOEUVRING, PAPER, 600.0)),
+        EstimatorCase("stationary (4.1), 100 s", PAPER, moving(Target(), PAPER, 100.0)),
+        EstimatorCase("2 m/s straight, 300 s", PAPER, moving(STRAIGHT, PAPER, 300.0)),
+        EstimatorCase("2 m/s in an S (4.2), 1000 s", PAPER, moving(EXPERIMENTS["S"].target, PAPER, 1000.0)),
+        EstimatorCase("manoeuvring (4.3), 600 s", PAPER, moving(EXPERIMENTS["manoeuvres"].target, PAPER, 600.0)),
     ]
 
 
-def table_row(case: Case, seeds: int = SEEDS) -> str:
-    """A case as a line of the Markdown table."""
-    found = examine(case, seeds)
-    cells = [case.name]
-    for values, numbers in ((found.nees, STATES), (found.nis[:, ~np.isnan(found.nis[0])], MEASURED)):
-        at_once = values.mean(axis=0)
-        low, high = band(numbers, seeds)
-        inside = np.mean((low < at_once) & (at_once < high))
-        worst = int(np.argmax(at_once))
-        cells += [_shown(at_once.mean()), f"{100.0 * inside:.0f} %"]
-        cells += [f"{_shown(at_once[worst])} at {worst * case.estimator.period:g} s"] * (numbers == STATES)
-    cells += [_shown(math.sqrt(np.mean(x * x))) for x in (found.error, found.deviation)]
+class Assessed(NamedTuple):
+    """What a case comes to, of all seeds."""
+
+    name: str
+    nees: float  # the mean
+    nees_inside: float  # %: of the sampling times at which the average over the seeds is in its band
+    nees_largest: float
+    largest_at: float  # s
+    nis: float
+    nis_inside: float  # %
+    error: float  # m rms
+    believed: float  # m rms, by the filter's own covariance
+
+
+def assessed(case: EstimatorCase, seeds: int = SEEDS) -> Assessed:
+    """Runs the case and sums it up."""
+    runs = examine(case, seeds)
+    nees, nis = runs.nees.mean(axis=0), runs.nis[:, ~np.isnan(runs.nis[0])].mean(axis=0)
+    worst = int(np.argmax(nees))
+    return Assessed(
+        case.name,
+        float(nees.mean()),
+        _inside(nees, STATES, seeds),
+        float(nees[worst]),
+        worst * case.estimator.period,
+        float(nis.mean()),
+        _inside(nis, MEASURED, seeds),
+        math.sqrt(np.mean(runs.error**2)),
+        math.sqrt(np.mean(runs.deviation**2)),
+    )
+
+
+def _inside(averages: Array, numbers: int, seeds: int) -> float:
+    low, high = band(numbers, seeds)
+    return 100.0 * float(np.mean((low < averages) & (averages < high)))
+
+
+def table_row(case: Assessed) -> str:
+    """A case as a line of the page's table."""
+    cells = (
+        case.name,
+        _digits(case.nees),
+        f"{case.nees_inside:.0f} %",
+        f"{_digits(case.nees_largest)} at {case.largest_at:g} s",
+        _digits(case.nis),
+        f"{case.nis_inside:.0f} %",
+        _digits(case.error),
+        _digits(case.believed),
+    )
     return f"| {' | '.join(cells)} |"
 
 
-def _shown(number: float) -> str:
+def _digits(number: float) -> str:
     return f"{number:.3g}" if number < 100.0 else f"{number:.0f}"
 
 
-def main(seeds: int) -> None:
-    """Prints the table."""
-    nees, nis = (f"{low:.2f}–{high:.2f}" for low, high in (band(STATES, seeds), band(MEASURED, seeds)))
-    titles = (f"target, {seeds} seeds", "NEES", f"in {nees}", "largest", "NIS", f"in {nis}", "error, m rms", "believed")
-    print(f"| {' | '.join(titles)} |\n|{'---|' * len(titles)}")
-    for case in cases():
-        print(table_row(case, seeds), flush=True)
+def page(results: Sequence[Assessed], seeds: int) -> str:
+    """The page."""
+    return (
+        template("harness.studies", "estimator.md.jinja").render(
+            results=results,
+            seeds=seeds,
+            nees_band=band(STATES, seeds),
+            nis_band=band(MEASURED, seeds),
+            table_row=table_row,
+            numbers=(STATES, MEASURED),
+        )
+        + "\n"
+    )
+
+
+@click.command()
+@click.option("--seeds", type=click.IntRange(2, 10_000), default=SEEDS, show_default=True, help="Runs of each case.")
+@out_option
+def main(seeds: int, out: Path) -> None:
+    """Run the filter on targets that fit its model and on the paper's; write OUT/estimator.md. Takes two minutes."""
+    every = cases()
+    results = list(counted((assessed(case, seeds) for case in every), len(every), "running the filter"))
+    write(out, {"estimator.md": page(results, seeds)})
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else SEEDS)
+    run(main, "harness.studies.estimator")

@@ -1,11 +1,14 @@
-"""Limit cycles predicted and flown: `python -m harness.studies.limit_cycle` writes docs/limit_cycle.md, its figure."""
+"""Limit cycles predicted and flown: `python -m harness.studies.limit_cycle` writes the page limit_cycle.md."""
 
+import csv
+import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import click
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,7 +17,6 @@ import aircraft
 from autopilot.laws import law
 from autopilot.nftsm import Nftsm
 from harness.drawing import draw
-from harness.files import replacing
 from harness.identification.fit import fit
 from harness.identification.identify import of_heading_rate
 from harness.identification.manoeuvres import STEP, flown, held
@@ -23,9 +25,10 @@ from harness.limit_cycle.prediction import VISIBLE, LimitCycle, Loop, boundary, 
 from harness.plants.identified import Identified, identified
 from harness.plants.lagged import Lagged
 from harness.plants.sixdof import SixDof
+from harness.studies.command import counted, out_option, run, write
 from harness.template import template
 
-AIRFRAMES = ("ultra_stick_25e", "skywalker_x8", "aerosonde")
+AIRFRAMES = tuple(aircraft.names())
 PERIOD = 0.05  # s, of the guidance
 PAPER_K2, PAPER_K3 = 12.0, 6.0
 LIMITS_DEG_S = (5.0, 10.0, 20.0)
@@ -55,7 +58,7 @@ def with_gains(loop: Loop, k2: float, k3: float) -> Loop:
     return replace(loop, law=replace(nftsm, k2=k2, k3=k3))
 
 
-class Row(NamedTuple):
+class FlownCycle(NamedTuple):
     """One limit cycle flown on 6-DOF and on `lagged`, and predicted."""
 
     airframe: str
@@ -67,7 +70,7 @@ class Row(NamedTuple):
     slow: LimitCycle | None  # predicted from the response to reversals between the limits
 
 
-def rows() -> Iterator[Row]:
+def cycles() -> Iterator[FlownCycle]:
     """The paper's gains on each airframe at each heading-rate limit."""
     for name in AIRFRAMES:
         airframe, one = airframe_of(name)
@@ -75,7 +78,7 @@ def rows() -> Iterator[Row]:
             loop = loop_of(one, limit_deg_s=limit)
             reversals = [flown(airframe, one.airspeed, held([limit, -limit] * 12, each)) for each in (0.5, 0.7, 1.0)]
             slow = fit([of_heading_rate(record) for record in reversals])
-            yield Row(
+            yield FlownCycle(
                 airframe=name,
                 limit_deg_s=limit,
                 sixdof=fly(loop, SixDof(airframe, STEP, rate_trim=True)),
@@ -134,7 +137,7 @@ def _bisected(at: Callable[[float], LimitCycle], guess: float) -> float:
     return math.sqrt(low * high)
 
 
-class Point(NamedTuple):
+class MapPoint(NamedTuple):
     """A flight in the map."""
 
     x: float
@@ -152,7 +155,7 @@ def map_figure(borders: Sequence[Border]) -> str:
         lines.append(line)
         points.append(
             [
-                Point(
+                MapPoint(
                     q * bandwidth,
                     k2,
                     _chatters(fly(with_gains(_quicker(loop, q), k2, 0.5 * k2), _lagged(loop, q), 60.0)),
@@ -164,7 +167,7 @@ def map_figure(borders: Sequence[Border]) -> str:
         sixdof = SixDof(aircraft.folder(b.airframe), STEP, rate_trim=True)
         own.append(
             [
-                Point(bandwidth, k2, _chatters(fly(with_gains(loop, k2, 0.5 * k2), sixdof, 60.0)))
+                MapPoint(bandwidth, k2, _chatters(fly(with_gains(loop, k2, 0.5 * k2), sixdof, 60.0)))
                 for k2 in (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 12.0)
             ]
         )
@@ -172,7 +175,7 @@ def map_figure(borders: Sequence[Border]) -> str:
     plane = {q: _plane(first, q) for q in (1.0, 2.0, 4.0)}
     grid = {
         q: [
-            Point(k2, k3, _chatters(fly(with_gains(_quicker(first, q), k2, k3), plant, 60.0)))
+            MapPoint(k2, k3, _chatters(fly(with_gains(_quicker(first, q), k2, k3), plant, 60.0)))
             for scale in (0.7, 1.4)
             for k2, k3 in scale * np.array(plane[q][1:-1:2])
         ]
@@ -212,7 +215,7 @@ def map_figure(borders: Sequence[Border]) -> str:
     return draw(paint, width=10.0, height=4.4)
 
 
-def _dots(axes: Axes, points: Sequence[Point], marker: str, size: float, colour: str) -> None:
+def _dots(axes: Axes, points: Sequence[MapPoint], marker: str, size: float, colour: str) -> None:
     """Filled where the flight chattered."""
     x, y, faces = zip(*((point.x, point.y, colour if point.chatters else "white") for point in points), strict=True)
     axes.scatter(x, y, s=size, marker=marker, edgecolors=colour, c=list(faces), linewidths=0.8, zorder=3)
@@ -247,13 +250,64 @@ def _corner(loop: Loop, q: float, a: float, b: float) -> tuple[float, float]:
     return k * a, k * b
 
 
-def document(found: Sequence[Row], borders: Sequence[Border]) -> str:
-    """docs/limit_cycle.md."""
-    return template("harness.studies", "limit_cycle.md.jinja").render(
-        rows=found, linear=[row for row in found if row.limit_deg_s <= LINEAR_UP_TO_DEG_S],
-        beyond=[row for row in found if row.limit_deg_s > LINEAR_UP_TO_DEG_S], largest=largest, borders=borders,
-        off=off, degrees=math.degrees, linear_up_to=LINEAR_UP_TO_DEG_S,
-    ) + "\n"  # fmt: skip
+def page(cycles: Sequence[FlownCycle], borders: Sequence[Border]) -> str:
+    """The page."""
+    return (
+        template("harness.studies", "limit_cycle.md.jinja").render(
+            cycles=cycles,
+            linear=[each for each in cycles if each.limit_deg_s <= LINEAR_UP_TO_DEG_S],
+            beyond=[each for each in cycles if each.limit_deg_s > LINEAR_UP_TO_DEG_S],
+            linear_up_to=LINEAR_UP_TO_DEG_S,
+            largest=largest,
+            borders=borders,
+            off=off,
+            degrees=math.degrees,
+            period=PERIOD,
+            k2=PAPER_K2,
+            k3=PAPER_K3,
+        )
+        + "\n"
+    )
+
+
+def cycles_csv(cycles: Sequence[FlownCycle]) -> str:
+    """Every cycle, a line each: flown on 6-DOF and on `lagged`, and predicted three ways."""
+    numbers = ("frequency Hz", "heading rate ± deg/s", "range error mean m", "range error ± m")
+    ways = ("sixdof", "lagged", "predicted", "one_harmonic", "slow")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("airframe", "limit deg/s", *(f"{way}: {number}" for way in ways for number in numbers)))
+    for cycle in cycles:
+        cells = [cell for way in ways for cell in _cells(getattr(cycle, way))]
+        writer.writerow((cycle.airframe, f"{cycle.limit_deg_s:g}", *cells))
+    return text.getvalue()
+
+
+def _cells(cycle: LimitCycle | None) -> tuple[str, ...]:
+    if cycle is None:
+        return ("",) * 4
+    rate = math.degrees(cycle.heading_rate)
+    return f"{cycle.frequency:.3f}", f"{rate:.2f}", f"{cycle.range_mean:.3f}", f"{cycle.range_error:.3f}"
+
+
+def borders_csv(borders: Sequence[Border]) -> str:
+    """Where each airframe's limit cycle begins, a line each."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    columns: Mapping[str, Callable[[Border], float]] = {
+        "bandwidth rad/s": lambda b: b.one.heading_rate.bandwidth,
+        "lag s (63 %)": lambda b: b.one.measured["lag_s"],
+        "critical gain 1/s": lambda b: b.critical,
+        "k2 with k3 = 0, 1/s": lambda b: b.k2_linear,
+        "k2 with k3 = k2/2, 1/s": lambda b: b.k2,
+        "the same flown on 6-DOF, 1/s": lambda b: b.k2_flown,
+        "times as quick for the paper's gains": lambda b: b.quicker,
+        "the same flown on lagged": lambda b: b.quicker_flown,
+        "command 30 % below the border, on lagged, deg/s": lambda b: math.degrees(b.faded),
+    }
+    writer.writerow(("airframe", *columns))
+    writer.writerows((b.airframe, *(f"{value(b):.4g}" for value in columns.values())) for b in borders)
+    return text.getvalue()
 
 
 def errors(predicted: LimitCycle, flown: LimitCycle) -> tuple[float, float]:
@@ -268,24 +322,29 @@ def off(predicted: LimitCycle | None, flown: LimitCycle) -> str:
     return ", ".join(f"{100.0 * error:+.0f}" for error in errors(predicted, flown))
 
 
-def largest(found: Sequence[Row]) -> str:
+def largest(cycles: Sequence[FlownCycle]) -> str:
     """The largest errors of the predictions against 6-DOF, of either sign."""
-    each = [errors(row.predicted, row.sixdof) for row in found if row.predicted is not None]
-    frequency, amplitude = np.abs(each).max(axis=0)
+    every = [errors(each.predicted, each.sixdof) for each in cycles if each.predicted is not None]
+    frequency, amplitude = np.abs(every).max(axis=0)
     return f"{100.0 * frequency:.0f} % in frequency and {100.0 * amplitude:.0f} % in amplitude"
 
 
-def main() -> None:
-    """Flies, predicts and writes; about a minute."""
-    docs = Path(__file__).parents[2] / "docs"
-    borders = [border(name) for name in AIRFRAMES]
-    for name, content in {
-        "images/limit_cycle.svg": map_figure(borders),
-        "limit_cycle.md": document(list(rows()), borders),
-    }.items():
-        with replacing(docs / name) as partial:
-            partial.write_text(content, encoding="utf-8")
+@click.command()
+@out_option
+def main(out: Path) -> None:
+    """Predict and fly the limit cycles; write OUT/limit_cycle.md with its figure and tables. Takes two minutes."""
+    borders = list(counted(map(border, AIRFRAMES), len(AIRFRAMES), "searching the border"))
+    flown_cycles = list(counted(cycles(), len(AIRFRAMES) * len(LIMITS_DEG_S), "flying limit cycles"))
+    write(
+        out,
+        {
+            "limit_cycle.svg": map_figure(borders),
+            "limit_cycle.csv": cycles_csv(flown_cycles),
+            "limit_cycle_border.csv": borders_csv(borders),
+            "limit_cycle.md": page(flown_cycles, borders),
+        },
+    )
 
 
 if __name__ == "__main__":
-    main()
+    run(main, "harness.studies.limit_cycle")

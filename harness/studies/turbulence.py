@@ -1,21 +1,24 @@
-"""What the turbulence is and what it does to the airframes: table and figure of docs/turbulence.md.
+"""Do the airframes come through turbulence? `python -m harness.studies.turbulence RUN...` writes turbulence.md.
 
-`make turbulence` flies the runs; `python -m harness.studies.turbulence RUN...` then writes both from their directories.
+`make turbulence` flies the runs first. The figure holds the turbulence against its specification.
 """
 
-import sys
-from collections.abc import Iterator, Sequence
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+import click
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import welch
 from scipy.stats import binomtest
 
 from harness.drawing import draw
-from harness.files import replacing
 from harness.runs.results import load_results
+from harness.studies.command import out_option, run, write
+from harness.template import template
 from harness.world.air import Array
 from harness.world.turbulence import dryden, turbulence
 from harness.world.wind import SEVERITIES
@@ -23,8 +26,6 @@ from harness.world.wind import SEVERITIES
 if TYPE_CHECKING:
     import pandas as pd
 
-DOCUMENT = Path("docs/turbulence.md")
-FIGURE = Path("docs/images/turbulence.svg")
 SHOWN = {  # metric: heading, decimals
     "airspeed_deviation_rms_mps": ("airspeed m/s rms", 2),
     "altitude_deviation_peak_m": ("height m peak", 1),
@@ -32,41 +33,82 @@ SHOWN = {  # metric: heading, decimals
     "heading_rate_error_rms_deg_s": ("heading rate °/s rms", 2),
     "range_error_rms_m": ("circle m rms", 2),
 }
+OUTCOMES = ("completed", "ground", "departed")
 GROUPED_BY = ["wind.turbulence", "wind.rotation", "aircraft", "start.airspeed_mps"]
 _SEVERITIES: list[object] = list(SEVERITIES)
 _MODEL, _SPAN, _HOURS, _STEPS = dryden("moderate", 13.0, 150.0), 1.27, 8, (0.005, 0.05)
 
 
-def survival(flights: "pd.DataFrame") -> list[str]:
-    """A Markdown table, a line for each airframe in each air: how flights ended, and metrics as means over them all."""
-    names = ["turbulence", "airframe", "flights", "completed", "ground", "departed", "survive", "95 %"]
-    lines = ["| " + " | ".join([*names, *(heading for heading, _ in SHOWN.values())]) + " |"]
-    lines.append("|---|---|" + "--:|" * (len(names) - 2 + len(SHOWN)))
+class Survival(NamedTuple):
+    """How an airframe's flights in one air ended, and the means of their metrics, of those that ended early too."""
+
+    turbulence: str
+    airframe: str
+    flights: int
+    ended: Mapping[str, int]  # by outcome, each of `OUTCOMES`
+    interval: tuple[float, float]  # of the share that completes its flight, %: 95 %, Wilson's
+    means: Mapping[str, float]  # by metric
+
+    @property
+    def share(self) -> float:
+        """Of the flights that last their full time, %."""
+        return 100.0 * self.ended["completed"] / self.flights
+
+
+class Added(NamedTuple):
+    """What turning air adds to the same flights, seed by seed, as means."""
+
+    airframe: str
+    pairs: int
+    means: Mapping[str, float]  # by metric
+
+
+def survivals(flights: "pd.DataFrame") -> list[Survival]:
+    """One for each airframe in each air, the calmest first."""
     groups = sorted(flights.groupby(GROUPED_BY, sort=False), key=lambda g: (_SEVERITIES.index(g[0][0]), not g[0][1]))
+    lines = []
     for (severity, rotation, airframe, airspeed), group in groups:
-        ended = group["outcome"].value_counts()
-        completed, total = int(ended.get("completed", 0)), len(group)
-        low, high = binomtest(completed, total).proportion_ci(method="wilson")
-        cells = [f"{severity}{'' if rotation else ', no rotation'}", f"{airframe}, {airspeed:g} m/s", str(total)]
-        cells += [str(ended.get(outcome, 0)) for outcome in ("completed", "ground", "departed")]
-        cells += [f"{100.0 * completed / total:.1f} %", f"{100.0 * low:.1f} to {100.0 * high:.1f}"]
-        cells += [f"{group[metric].mean():.{decimals}f}" for metric, (_, decimals) in SHOWN.items()]
-        lines.append("| " + " | ".join(cells) + " |")
+        counts = group["outcome"].value_counts()
+        ended = {outcome: int(counts.get(outcome, 0)) for outcome in OUTCOMES}
+        low, high = binomtest(ended["completed"], len(group)).proportion_ci(method="wilson")
+        air = f"{severity}{'' if rotation else ', no rotation'}"
+        means = {metric: float(group[metric].mean()) for metric in SHOWN}
+        name = f"{airframe}, {airspeed:g} m/s"
+        lines.append(Survival(air, name, len(group), ended, (100.0 * low, 100.0 * high), means))
     return lines
 
 
-def rotation(flights: "pd.DataFrame") -> list[str]:
-    """A Markdown table: what turning air adds to the same flights, seed by seed, as means; none without such pairs."""
+def rotation(flights: "pd.DataFrame") -> list[Added]:
+    """What turning air adds, one for each airframe in each air; none without such pairs."""
     alike = [*(key for key in GROUPED_BY if key != "wind.rotation"), "seed"]
     turning, still = (flights[flights["wind.rotation"] == on].set_index(alike)[list(SHOWN)] for on in (True, False))
     added = (turning - still).dropna()
-    lines = ["| turning air adds | pairs | " + " | ".join(heading for heading, _ in SHOWN.values()) + " |"]
-    lines.append("|---|" + "--:|" * (1 + len(SHOWN)))
-    for (severity, airframe, airspeed), group in added.groupby(alike[:-1], sort=False):
-        cells = [f"{severity}, {airframe}, {airspeed:g} m/s", str(len(group))]
-        cells += [f"{group[metric].mean():+.3f}" for metric in SHOWN]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+    return [
+        Added(
+            f"{severity}, {airframe}, {airspeed:g} m/s",
+            len(group),
+            {metric: float(group[metric].mean()) for metric in SHOWN},
+        )
+        for (severity, airframe, airspeed), group in added.groupby(alike[:-1], sort=False)
+    ]
+
+
+def survivals_csv(lines: Sequence[Survival]) -> str:
+    """The table of all that was flown."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("turbulence", "airframe", "flights", *OUTCOMES, "low %", "high %", *SHOWN))
+    for line in lines:
+        counts = [line.ended[outcome] for outcome in OUTCOMES]
+        interval = [f"{end:.1f}" for end in line.interval]
+        means = [f"{line.means[metric]:.{decimals}f}" for metric, (_, decimals) in SHOWN.items()]
+        writer.writerow((line.turbulence, line.airframe, line.flights, *counts, *interval, *means))
+    return text.getvalue()
+
+
+def page(lines: Sequence[Survival], added: Sequence[Added]) -> str:
+    """The page."""
+    return template("harness.studies", "turbulence.md.jinja").render(lines=lines, added=added, shown=SHOWN) + "\n"
 
 
 def spectra(step: float) -> Iterator[tuple[str, Array, Array, Array]]:
@@ -109,25 +151,24 @@ def paint(figure: Figure) -> None:
     panels[0, 0].legend(fontsize=7)
 
 
-def main(runs: Sequence[str]) -> None:
-    """Writes table and figure."""
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@out_option
+def main(runs: Sequence[str], out: Path) -> None:
+    """Read the flights of each RUN, a directory of `harness run`, and write OUT/turbulence.md, its figure and table."""
     import pandas as pd
 
     flights = pd.concat([load_results(run) for run in runs])
-    table = "\n".join([*survival(flights), "", *rotation(flights), ""])
-    print(table)
-    text = DOCUMENT.read_text(encoding="utf-8")
-    before, begin, rest = text.partition("<!-- survival -->\n")
-    _, end, after = rest.partition("<!-- end -->\n")
-    if not (begin and end):
-        raise ValueError(f"{DOCUMENT}: has no place for the table, between <!-- survival --> and <!-- end -->")
-    for path, content in {
-        DOCUMENT: f"{before}{begin}{table}\n{end}{after}",
-        FIGURE: draw(paint, 9.0, 4.8),
-    }.items():
-        with replacing(path) as partial:
-            partial.write_text(content, encoding="utf-8")
+    lines = survivals(flights)
+    write(
+        out,
+        {
+            "turbulence.svg": draw(paint, 9.0, 4.8),
+            "turbulence.csv": survivals_csv(lines),
+            "turbulence.md": page(lines, rotation(flights)),
+        },
+    )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run(main, "harness.studies.turbulence")

@@ -7,16 +7,26 @@ from typing import Any
 import numpy as np
 
 from autopilot.laws import law
+from harness.studies.paper.claims_of_geometry import nftsm
 from harness.studies.paper.columns import Column
+from harness.studies.paper.decision import Decision, decide, metres, sooner, within
 from harness.studies.paper.experiments import EXPERIMENTS, LAWS, NEITHER, NO_TURN_RATE, TRUTH, Reading, flight
-from harness.studies.paper.ledger import Finding, holds, holds_if, metres, sooner, within
-from harness.studies.paper.measures import azimuth, delay, overshoot, peak, restricted, settled
+from harness.studies.paper.measures import (
+    CONVERGED,
+    ON_THE_CIRCLE,
+    azimuth,
+    delay,
+    overshoot,
+    peak,
+    restricted,
+    settled,
+)
 from harness.studies.paper.reproduce import NUMBERS, shown
 
 _LAWS = ("NFTSM", "NFTSM_1", "SMC")
 
 
-def _numbers(on: Column, where: str, *, printed_gains: bool = False) -> Finding:
+def _numbers(on: Column, where: str, *, printed_gains: bool = False) -> Decision:
     """How many of a section's printed numbers agree here."""
     told, agreeing = [], 0
     wanted = [n for n in NUMBERS if n.where == where and (n.law == "NFTSM as printed") == printed_gains]
@@ -25,39 +35,39 @@ def _numbers(on: Column, where: str, *, printed_gains: bool = False) -> Finding:
         ours = n.measure(*(on.paper(n.experiment, law, duration=duration) for law in (n.law, n.against) if law))
         agreeing += n.agrees(ours)
         told.append(f"{n.law} {shown(n, ours)} ({n.printed})")
-    return holds(agreeing == len(wanted), f"{agreeing} of {len(wanted)}, ours (printed): " + ", ".join(told))
+    return decide(agreeing == len(wanted), f"{agreeing} of {len(wanted)}, ours (printed): " + ", ".join(told))
 
 
-def table_3(on: Column) -> Finding:
+def table_3(on: Column) -> Decision:
     """All six rows, NFTSM with the fitted gains."""
     return _numbers(on, "Table 3")
 
 
-def table_3_as_printed(on: Column) -> Finding:
+def table_3_as_printed(on: Column) -> Decision:
     """NFTSM's two rows with the gains printed for it."""
     return _numbers(on, "Table 3", printed_gains=True)
 
 
-def numbers_of_4_2(on: Column) -> Finding:
+def numbers_of_4_2(on: Column) -> Decision:
     """The S."""
     return _numbers(on, "4.2")
 
 
-def numbers_of_4_3(on: Column) -> Finding:
+def numbers_of_4_3(on: Column) -> Decision:
     """The manoeuvring target."""
     return _numbers(on, "4.3")
 
 
-def all_circle(on: Column) -> Finding:
+def all_circle(on: Column) -> Decision:
     """The three laws round a stationary target, from 30 deg."""
     ends = {label: peak(on.paper("30", label), 75.0) for label in _LAWS}
-    return holds(
-        all(end < max(1.0, on.tolerance) for end in ends.values()),
+    return decide(
+        all(end < ON_THE_CIRCLE for end in ends.values()),
         "|r| in the last 5 s of 80: " + ", ".join(f"{label} {metres(end)}" for label, end in ends.items()),
     )
 
 
-def nftsm_is_faster(on: Column) -> Finding:
+def nftsm_is_faster(on: Column) -> Decision:
     """To 1 m and to the column's tolerance, from both starts."""
     told, fine = [], True
     for experiment in ("30", "130"):
@@ -65,36 +75,40 @@ def nftsm_is_faster(on: Column) -> Finding:
             a, b = (settled(on.paper(experiment, label), tolerance) for label in ("NFTSM", "SMC"))
             fine = fine and sooner(a, b)
             told.append(f"from {experiment}° to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
-    return holds(fine, "; ".join(told))
+    return decide(fine, "; ".join(told))
 
 
-def larger_gains_overshoot(on: Column) -> Finding:
+def larger_gains_overshoot(on: Column) -> Decision:
     """NFTSM_1 against NFTSM, from 30 deg."""
     small, large = (overshoot(on.paper("30", label)) for label in ("NFTSM", "NFTSM_1"))
-    return holds(large > 2.0 * small and large > 1.0, f"NFTSM_1 (2, 3) {large:.2f} m, NFTSM (0.4, 2.4) {metres(small)}")
+    gains = ", ".join(
+        f"{label} ({steering.alpha2:g}, {steering.beta2:g}) {metres(x)}"
+        for label, steering, x in (("NFTSM_1", nftsm("NFTSM_1"), large), ("NFTSM", nftsm("NFTSM"), small))
+    )
+    return decide(large > 2.0 * small and large > 1.0, gains)
 
 
-def slower_from_130(on: Column) -> Finding:
+def slower_from_130(on: Column) -> Decision:
     """SMC from 130 deg, 100 s and longer."""
     nftsm = settled(on.paper("130", "NFTSM"), max(1e-4, on.tolerance))
     smc = on.paper("130", "SMC", Reading(period=0.005), 400.0)
     at_100 = float(smc["range_error"][np.searchsorted(smc["time"], 100.0)])
-    return holds(
+    return decide(
         nftsm is not None and abs(at_100) > 1.0,
         f"NFTSM within {on.tolerance:g} m {within(nftsm)}; SMC is {at_100:.1f} m off after 100 s, "
         f"within 1 m {within(settled(smc, 1.0))}",
     )
 
 
-def restricted_8_to_17(on: Column) -> Finding:
+def restricted_8_to_17(on: Column) -> Decision:
     """When NFTSM's command is at the limit."""
     spans = {experiment: restricted(on.paper(experiment, "NFTSM")) for experiment in ("30", "130")}
     told = [f"from {e}° " + (f"{span[0]:.1f} to {span[1]:.1f} s" if span else "never") for e, span in spans.items()]
     right = any(span is not None and (round(span[0]), round(span[1])) == (8, 17) for span in spans.values())
-    return holds(right, "at the limit first " + ", ".join(told))
+    return decide(right, "at the limit first " + ", ".join(told))
 
 
-def mobility(on: Column) -> Finding:
+def mobility(on: Column) -> Decision:
     """How hard the two laws steer, from 130 deg, first 60 s."""
     told, rates = [], []
     for label in ("NFTSM", "SMC"):
@@ -104,14 +118,14 @@ def mobility(on: Column) -> Finding:
         told.append(
             f"{label} up to {rates[-1][0]:.2f} deg/s, at the limit {100.0 * rates[-1][1]:.0f} % of the first 60 s"
         )
-    return holds(rates[0][1] > 0.25 and rates[1][1] == 0.0, "; ".join(told))
+    return decide(rates[0][1] > 0.25 and rates[1][1] == 0.0, "; ".join(told))
 
 
-def they_stay(on: Column) -> Finding:
+def they_stay(on: Column) -> Decision:
     """400 s from 30 deg: the last half."""
     ends = {label: peak(on.paper("30", label, Reading(period=0.005), 400.0), 200.0) for label in _LAWS}
-    return holds(
-        all(end < max(1.0, on.tolerance) for end in ends.values()),
+    return decide(
+        all(end < ON_THE_CIRCLE for end in ends.values()),
         "|r| from 200 s to 400 s: " + ", ".join(f"{label} {metres(end)}" for label, end in ends.items()),
     )
 
@@ -119,44 +133,43 @@ def they_stay(on: Column) -> Finding:
 # Section 4.2
 
 
-def faster_round_the_s(on: Column) -> Finding:
+def faster_round_the_s(on: Column) -> Decision:
     """NFTSM against SMC."""
     told, fine = [], True
     for tolerance in sorted({1.0, on.tolerance}, reverse=True):
         a, b = (settled(on.paper("S", label, duration=330.0), tolerance) for label in ("NFTSM", "SMC"))
         fine = fine and sooner(a, b)
         told.append(f"to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
-    return holds(fine, "; ".join(told))
+    return decide(fine, "; ".join(told))
 
 
-def slow_adjustment(on: Column) -> Finding:
+def slow_adjustment(on: Column) -> Decision:
     """The largest commands in the first 30 s round the S."""
     rates = []
     for label in ("NFTSM", "SMC"):
         log = on.paper("S", label, duration=330.0)
         rates.append(float(np.degrees(np.abs(log["heading_rate_command"][log["time"] < 30.0])).max()))
-    return holds(
+    return decide(
         rates[1] < 0.95 * rates[0],
         f"SMC turns with up to {rates[1]:.2f} deg/s in the first 30 s, NFTSM with {rates[0]:.2f}",
     )
 
 
-def overshoot_improves(on: Column) -> Finding:
+def overshoot_improves(on: Column) -> Decision:
     """NFTSM_1 round the S, before and after 75 s."""
     log = on.paper("S", "NFTSM_1", duration=330.0)
     early, late = overshoot(log, 75.0), peak(log, 75.0)
-    return holds(early > 1.0 > late, f"{early:.1f} m before 75 s, |r| {metres(late)} after")
+    return decide(early > 1.0 > late, f"{early:.1f} m before 75 s, |r| {metres(late)} after")
 
 
-def all_converge_in_2000_s(on: Column) -> Finding:
+def all_converge_in_2000_s(on: Column) -> Decision:
     """The whole S, 2000 s."""
-    told, fine = [], []
-    for label in _LAWS:
-        log = on.paper("S", label, Reading(period=0.02))  # long, and not to be settled to 1e-4 m
-        r, time = np.abs(log["range_error"]), log["time"]
-        fine.append(float(r[time > 400.0].max()) < max(1.0, on.tolerance))
-        told.append(f"{label} {metres(float(r[time > 400.0].max()))}")
-    return holds_if("zero means 1 m", all(fine), "largest |r| from 400 s to 2000 s: " + ", ".join(told))
+    largest = {label: peak(on.paper("S", label, Reading(period=0.02)), 400.0) for label in _LAWS}
+    return decide(
+        all(x < CONVERGED for x in largest.values()),
+        "largest |r| from 400 s to 2000 s: " + ", ".join(f"{label} {metres(x)}" for label, x in largest.items()),
+        under={"zero means 1 m": all(x < ON_THE_CIRCLE for x in largest.values())},
+    )
 
 
 # Section 4.3
@@ -182,7 +195,7 @@ def _told(peaks: dict[str, float]) -> str:
     return ", ".join(f"{metres(x)} in {span}" for span, x in peaks.items())
 
 
-def circles_then_follows(on: Column) -> Finding:
+def circles_then_follows(on: Column) -> Decision:
     """NFTSM before 300 s and after 600 s."""
     log = on.paper("manoeuvres", "NFTSM")
     angle, time = azimuth(log), log["time"]
@@ -190,25 +203,27 @@ def circles_then_follows(on: Column) -> Finding:
         abs(angle[np.searchsorted(time, b)] - angle[np.searchsorted(time, a)]) / math.tau
         for a, b in ((50.0, 300.0), (600.0, 899.0))
     )
-    return holds(
+    return decide(
         late < 0.5,
         f"{early:.1f} turns from 50 s to 300 s; at 11 m/s {late:.1f} turns from 600 s to 899 s",
     )
 
 
-def all_return(on: Column) -> Finding:
+def all_return(on: Column) -> Decision:
     """|r| in the last 100 of 900 s, and of NFTSM_1 without its limit."""
     ends = {label: peak(on.paper("manoeuvres", label), 800.0) for label in _LAWS}
     free = peak(on.paper("manoeuvres", "NFTSM_1", _reading(limited=False)), 800.0)
     told = ", ".join(f"{label} {metres(x)}" for label, x in ends.items())
     number = f"|r| from 800 s on: {told}; NFTSM_1 without its limit {metres(free)}"
-    returned = {label: x < max(1.0, on.tolerance) for label, x in (*ends.items(), ("free", free))}
-    if all(returned[label] for label in ("NFTSM", "SMC", "free")) and not returned["NFTSM_1"]:
-        return holds_if("NFTSM_1 has no limit either", True, number)
-    return holds(all(returned[label] for label in _LAWS), number)
+    returned = {label: x < ON_THE_CIRCLE for label, x in (*ends.items(), ("free", free))}
+    return decide(
+        all(returned[label] for label in _LAWS),
+        number,
+        under={"NFTSM_1 has no limit either": all(returned[label] for label in ("NFTSM", "SMC", "free"))},
+    )
 
 
-def adjusts_in_turns(on: Column) -> Finding:
+def adjusts_in_turns(on: Column) -> Decision:
     """How far NFTSM's command wanders, in deg/s per second."""
     log = on.paper("manoeuvres", "NFTSM")
     command, time = np.degrees(log["heading_rate_command"]), log["time"]
@@ -218,54 +233,61 @@ def adjusts_in_turns(on: Column) -> Finding:
         return float(np.abs(np.diff(command[during])).sum()) / (end - begin)
 
     steady, speeding, turning = activity(200.0, 299.0), activity(300.0, 350.0), activity(399.0, 411.0)
-    return holds(
+    return decide(
         turning > 2.0 * speeding,
         f"the command moves by {turning:.2g} deg/s² in the turn at 400 s, {speeding:.2g} while accelerating, "
         f"{steady:.2g} before",
     )
 
 
-def only_smc_is_off(on: Column) -> Finding:
+def only_smc_is_off(on: Column) -> Decision:
     """While the target accelerates, and up to the next manoeuvre."""
     peaks = {label: (_span(on, label, 300.0, 350.0), _span(on, label, 350.0, 399.0)) for label in _LAWS}
     told = ", ".join(f"{label} {metres(a)} and {metres(b)}" for label, (a, b) in peaks.items())
-    stable = {label: max(pair) < max(1.0, on.tolerance) for label, pair in peaks.items()}
-    fine = peaks["SMC"][0] > 10.0 and peaks["NFTSM"][0] < 1.0 and peaks["NFTSM_1"][0] < 1.0
-    number = f"|r| while it accelerates, and until 399 s: {told} (printed: 17.4 m for SMC)"
-    if fine and not stable["NFTSM_1"]:
-        return holds_if(
-            "one looks no further than 350 s",
-            True,
-            number + f"; NFTSM_1 at {on.limited} cannot hold the circle of a target at 7 m/s",
-        )
-    return holds(fine, number)
+    stable = {label: max(pair) < ON_THE_CIRCLE for label, pair in peaks.items()}
+    until_350_s = peaks["SMC"][0] > 10.0 and all(peaks[label][0] < ON_THE_CIRCLE for label in ("NFTSM", "NFTSM_1"))
+    return decide(
+        until_350_s and stable["NFTSM"] and stable["NFTSM_1"],
+        f"|r| while it accelerates, and until 399 s: {told} (printed: 17.4 m for SMC; NFTSM_1 is limited to "
+        f"{on.limited}, the circle of a target at 7 m/s takes up to {_circle_takes(on, 7.0):.1f})",
+        under={"one looks no further than 350 s": until_350_s},
+    )
+
+
+def _circle_takes(on: Column, speed: float) -> float:
+    """The largest heading rate on the circle of a target of this speed, (v_a + w)^2 / (v_a R_d), deg/s."""
+    one = on.change(flight("manoeuvres", "NFTSM_1"))
+    v_a, wind = one.start.airspeed, math.hypot(*one.wind.steady)
+    return math.degrees((v_a + speed + wind) ** 2 / (v_a * one.law.standoff))
 
 
 def _span(on: Column, label: str, begin: float, end: float, reading: Reading | None = None) -> float:
     return peak(on.paper("manoeuvres", label, reading), begin, end)
 
 
-def smc_comes_back(on: Column) -> Finding:
+def smc_comes_back(on: Column) -> Decision:
     """SMC after the acceleration."""
     log = on.paper("manoeuvres", "SMC")
     at = [float(abs(log["range_error"][np.searchsorted(log["time"], t)])) for t in (350.0, 375.0, 399.0)]
-    return holds(at[2] < 0.5 * at[0], "|r| " + ", ".join(f"{x:.2g}" for x in at) + " m at 350, 375, 399 s")
+    return decide(at[2] < 0.5 * at[0], "|r| " + ", ".join(f"{x:.2g}" for x in at) + " m at 350, 375, 399 s")
 
 
-def larger_at_460(on: Column) -> Finding:
+def larger_at_460(on: Column) -> Decision:
     """SMC: the sharp acceleration with a turn, against the slow one."""
     slow, sharp = _span(on, "SMC", 300.0, 350.0), _span(on, "SMC", 460.0, 549.0)
-    return holds(sharp > slow, f"{sharp:.1f} m from 460 s on, {slow:.1f} m at 300 s to 350 s")
+    return decide(sharp > slow, f"{sharp:.1f} m from 460 s on, {slow:.1f} m at 300 s to 350 s")
 
 
-def small_at_550(on: Column) -> Finding:
+def small_at_550(on: Column) -> Decision:
     """SMC in the slow turn."""
     turn = _span(on, "SMC", 550.0, 570.0)
     slow = _span(on, "SMC", 300.0, 350.0)
-    return holds(turn < 0.25 * slow, f"|r| up to {metres(turn)} from 550 s to 570 s, {metres(slow)} while accelerating")
+    return decide(
+        turn < 0.25 * slow, f"|r| up to {metres(turn)} from 550 s to 570 s, {metres(slow)} while accelerating"
+    )
 
 
-def sensitive_to_speed(on: Column) -> Finding:
+def sensitive_to_speed(on: Column) -> Decision:
     """SMC: |r| while accelerating, and in the sharp turn and after it; under other knowledge too."""
     known = {
         "turn rate only": None,
@@ -273,25 +295,22 @@ def sensitive_to_speed(on: Column) -> Finding:
         "acceleration only": _reading(known=NO_TURN_RATE),
         "neither": _reading(known=NEITHER),
     }
-    estimated = on.change(flight("30", "SMC")).estimator.kind == "ekf"
-    found = {}
-    for name, reading in known.items():
-        found[name] = (_span(on, "SMC", 300.0, 350.0, reading), _span(on, "SMC", 400.0, 459.0, reading))
-        if estimated:
-            return holds(
-                found[name][0] > 2.0 * found[name][1],
-                f"{metres(found[name][0])} while accelerating, {metres(found[name][1])} in and after the sharp turn",
-            )
-    sensitive = {name: speed > 2.0 * turn for name, (speed, turn) in found.items()}
-    told = "; ".join(f"{name} {metres(a)} and {metres(b)}" for name, (a, b) in found.items())
-    return holds_if(
-        "it knows the target's turn rate and not its acceleration",
-        list(sensitive.values()) == [True, False, False, False],
+    if on.change(flight("30", "SMC")).estimator.kind == "ekf":  # whatever else the law might know
+        known = {"EKF": None}
+    spans = {
+        name: (_span(on, "SMC", 300.0, 350.0, reading), _span(on, "SMC", 400.0, 459.0, reading))
+        for name, reading in known.items()
+    }
+    sensitive = {name: speed > 2.0 * turn for name, (speed, turn) in spans.items()}
+    told = "; ".join(f"{name} {metres(a)} and {metres(b)}" for name, (a, b) in spans.items())
+    return decide(
+        all(sensitive.values()),
         f"|r| while accelerating, and in and after the sharp turn, by what the law knows: {told}",
+        under={"it knows the target's turn rate and not its acceleration": sensitive.get("turn rate only", False)},
     )
 
 
-def nftsm_1_is_sensitive_to_turns(on: Column) -> Finding:
+def nftsm_1_is_sensitive_to_turns(on: Column) -> Decision:
     """NFTSM_1, limited, and not."""
     limited = _span(on, "NFTSM_1", 300.0, 350.0), _span(on, "NFTSM_1", 400.0, 459.0)
     free = tuple(_span(on, "NFTSM_1", *span, _reading(limited=False)) for span in ((300.0, 350.0), (400.0, 459.0)))
@@ -300,92 +319,101 @@ def nftsm_1_is_sensitive_to_turns(on: Column) -> Finding:
         f"{on.limited}; without the limit "
         f"{metres(free[0])} and {metres(free[1])}"
     )
-    if limited[1] > limited[0] and not free[1] > free[0]:
-        return holds_if("its command is limited", True, number)
-    return holds(limited[1] > limited[0], number)
+    return decide(
+        limited[1] > limited[0] and free[1] > free[0],
+        number,
+        under={"its command is limited": limited[1] > limited[0]},
+    )
 
 
-def within_0_1_m(on: Column) -> Finding:
+def within_0_1_m(on: Column) -> Decision:
     """NFTSM in all manoeuvres, and what it is when it knows neither acceleration nor turn rate."""
     worst = _span(on, "NFTSM", 300.0, 900.0)
     blind = _span(on, "NFTSM", 300.0, 900.0, _reading(known=NEITHER))
     limited = _span(on, "NFTSM", 300.0, 900.0, _reading(limited=True))
-    if worst <= 0.1 < limited:
-        return holds_if(
-            "its command is not limited",
-            True,
-            f"{metres(worst)} at the most, {metres(blind)} when it knows neither acceleration nor turn rate; "
-            f"at {on.limited} {metres(limited)}",
-        )
-    return holds(worst <= 0.1, f"{metres(worst)} at the most; at {on.limited} {metres(limited)}")
+    return decide(
+        max(worst, limited) <= 0.1,
+        f"{metres(worst)} at the most, {metres(blind)} when it knows neither acceleration nor turn rate; "
+        f"at {on.limited} {metres(limited)}",
+        under={"its command is not limited": worst <= 0.1},
+    )
 
 
-def more_sensitive_to_turns(on: Column) -> Finding:
+def more_sensitive_to_turns(on: Column) -> Decision:
     """NFTSM: turning against accelerating."""
     peaks = _peaks(on, "NFTSM")
     blind = _peaks(on, "NFTSM", _reading(known=NEITHER))
     number = f"NFTSM {_told(peaks)}; knowing neither acceleration nor turn rate {_told(blind)}"
-    turns, speeds = peaks["400-410 s"], peaks["300-350 s"]
-    if not turns > speeds and blind["400-410 s"] > blind["300-350 s"]:
-        return holds_if("it does not know the turn rate", True, number)
-    return holds(turns > speeds, number)
+    more, more_blind = (each["400-410 s"] > each["300-350 s"] for each in (peaks, blind))
+    return decide(more and more_blind, number, under={"it does not know the turn rate": more_blind})
 
 
-def limit_is_the_reason(on: Column) -> Finding:
+def limit_is_the_reason(on: Column) -> Decision:
     """NFTSM_1 with and without the limit."""
     limited, free = (_span(on, "NFTSM_1", 300.0, 900.0, reading) for reading in (None, _reading(limited=False)))
-    return holds(limited > 100.0 * free, f"|r| up to {limited:.0f} m with the limit, {metres(free)} without")
+    return decide(limited > 100.0 * free, f"|r| up to {limited:.0f} m with the limit, {metres(free)} without")
 
 
-def delayed(on: Column) -> Finding:
+def delayed(on: Column) -> Decision:
     """SMC's heading behind the others'."""
     logs = {label: on.paper("manoeuvres", label, duration=600.0) for label in _LAWS}
     behind = {label: delay(logs["SMC"], logs[label]) for label in ("NFTSM", "NFTSM_1")}
     told = ", ".join(f"behind {label} {'-' if x is None else f'{x:.1f} s'}" for label, x in behind.items())
     lag = behind["NFTSM"]
-    return holds(lag is not None and round(lag, 1) == 10.3, f"SMC passes 180° {told}")
+    return decide(lag is not None and round(lag, 1) == 10.3, f"SMC passes 180° {told}")
 
 
 # Conclusions
 
 
-def constraints_satisfied(on: Column) -> Finding:
+def constraints_satisfied(on: Column) -> Decision:
     """The largest commands that NFTSM gives where it is not limited: to converge, and to hold the circle."""
     log = on.paper("manoeuvres", "NFTSM")
     command, time = np.degrees(np.abs(log["heading_rate_command"])), log["time"]
     whole, slow, fast = command.max(), command[(time > 100.0) & (time < 299.0)].max(), command[time > 600.0].max()
-    number = (
+    return decide(
+        bool(whole <= on.limit),
         f"Section 4.3 is flown without the limit of {on.limited}: NFTSM commands up to {whole:.0f} deg/s, "
-        f"{slow:.1f} to hold the circle at 2 m/s, {fast:.1f} at 11 m/s"
+        f"{slow:.1f} to hold the circle at 2 m/s, {fast:.1f} at 11 m/s",
+        under={
+            "the command is limited": bool(max(slow, fast) <= on.limit),
+            "the target is slow and the command limited": bool(slow <= on.limit),
+        },
     )
-    if slow <= on.limit < fast:
-        return holds_if("the target is slow and the command limited", True, number)
-    return holds_if("the command is limited", max(slow, fast) <= on.limit < whole, number)
 
 
-def high_manoeuvring(on: Column) -> Finding:
+def high_manoeuvring(on: Column) -> Decision:
     """NFTSM's r, without the limit and with it."""
     free, limited = (
         peak(on.paper("manoeuvres", "NFTSM", reading), 800.0) for reading in (None, _reading(limited=True))
     )
-    number = f"|r| from 800 s on {metres(free)} without the limit, {metres(limited)} with it"
-    if free < max(1.0, on.tolerance) < limited:
-        return holds_if(f"its command is not limited to {on.limited}", True, number)
-    return holds(max(free, limited) < max(1.0, on.tolerance), number)
+    return decide(
+        max(free, limited) < ON_THE_CIRCLE,
+        f"|r| from 800 s on {metres(free)} without the limit, {metres(limited)} with it",
+        under={f"its command is not limited to {on.limited}": free < ON_THE_CIRCLE},
+    )
 
 
-def alpha2_and_beta2(on: Column) -> Finding:
+def alpha2_and_beta2(on: Column) -> Decision:
     """Convergence and overshoot from 30 deg as alpha2, then beta2, grows."""
-    told, times, shocks = [], [], []
-    for alpha2, beta2 in ((0.1, 2.4), (0.2, 2.4), (0.4, 2.4), (0.8, 2.4), (1.6, 2.4), (0.4, 1.2), (0.4, 4.8)):
+    lines: list[str] = []
+    times: dict[tuple[float, float], float | None] = {}
+    shocks: dict[tuple[float, float], float] = {}
+    for pair in ((0.1, 2.4), (0.2, 2.4), (0.4, 2.4), (0.8, 2.4), (1.6, 2.4), (0.4, 1.2), (0.4, 4.8)):
         one = flight("30", "NFTSM", Reading(period=0.005))
-        log = on.fly(replace(one, law=law(*LAWS["NFTSM"], alpha2=alpha2, beta2=beta2)))
-        times.append(settled(log, 1.0))
-        shocks.append(overshoot(log))
-        told.append(f"({alpha2:g}, {beta2:g}) {within(times[-1])}, {metres(shocks[-1])}")
-    reduces = sooner(times[2], times[0]) and shocks[2] < 1.0 and shocks[4] > 1.0 and not sooner(times[4], times[2])
-    return holds_if(
-        "it is α2, and moderately: far beyond, the shock makes it longer; a smaller β2 shortens it too",
-        reduces,
-        "(α2, β2): within 1 m in, overshoot: " + "; ".join(told),
+        log = on.fly(replace(one, law=law(*LAWS["NFTSM"], alpha2=pair[0], beta2=pair[1])))
+        times[pair], shocks[pair] = settled(log, ON_THE_CIRCLE), overshoot(log)
+        lines.append(f"({pair[0]:g}, {pair[1]:g}) {within(times[pair])}, {metres(shocks[pair])}")
+    small, fitted, large = (0.1, 2.4), (0.4, 2.4), (1.6, 2.4)
+    shock = shocks[fitted] < 1.0 < shocks[large]
+    alpha2_reduces = sooner(times[fitted], times[small])
+    alpha2_goes_on = sooner(times[large], times[fitted])
+    beta2_reduces = sooner(times[0.4, 4.8], times[0.4, 1.2])
+    return decide(
+        shock and alpha2_reduces and alpha2_goes_on and beta2_reduces,
+        "(α2, β2): within 1 m in, overshoot: " + "; ".join(lines),
+        under={
+            "it is α2 that grows": shock and alpha2_reduces and alpha2_goes_on,
+            "it is α2 that grows, and moderately: far beyond, the shock makes it longer": shock and alpha2_reduces,
+        },
     )

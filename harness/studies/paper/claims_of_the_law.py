@@ -13,24 +13,25 @@ from harness.checks import problems
 from harness.flight import Flight
 from harness.studies.paper.claims_of_the_manifold import inner_rate, manifold
 from harness.studies.paper.columns import Column, EndedEarlyError
+from harness.studies.paper.decision import Decision, decide, every, less, metres, within
 from harness.studies.paper.experiments import LAWS, STRAIGHT, Reading, flight, own
-from harness.studies.paper.ledger import Finding, holds, holds_if, metres, within
-from harness.studies.paper.measures import azimuth, peak, rms, settled, turns
+from harness.studies.paper.measures import ON_THE_CIRCLE, azimuth, peak, rms, settled, turns
 from harness.studies.paper.theory import longest_stable_period, reaching_time
 from harness.world.target import Target
 from harness.world.wind import Wind
 
 _STEP = 0.005  # s
+NEARLY_AS_FAST = 12.0  # m/s of 13: a target that is slower than the aircraft by less than a tenth
 
 
 # Abstract, introduction, Section 2
 
 
-def circles_a_moving_target(on: Column) -> Finding:
+def circles_a_moving_target(on: Column) -> Decision:
     """NFTSM round the S, until 330 s."""
     log = on.paper("S", "NFTSM", duration=330.0)
     time = settled(log, 1.0)
-    return holds(
+    return decide(
         time is not None and turns(log, time) > 1.0,
         f"within 1 m of the circle round the S {'never' if time is None else f'from {time:g} s on'}, "
         f"{turns(log, time or 100.0):.1f} turns till 330 s, r "
@@ -38,54 +39,55 @@ def circles_a_moving_target(on: Column) -> Finding:
     )
 
 
-def smc_takes_for_ever(on: Column) -> Finding:
+def smc_takes_for_ever(on: Column) -> Decision:
     """The traditional law, 400 s round a stationary target: does the error go on falling?"""
     log = on.paper("30", "SMC", Reading(period=0.005), 400.0)
     at = [abs(float(log["range_error"][np.searchsorted(log["time"], t)])) for t in (100.0, 200.0, 300.0, 400.0)]
-    return holds(
-        at[-1] < 1.0 and all(later < earlier for earlier, later in pairwise(at)),
+    return decide(
+        at[-1] < ON_THE_CIRCLE and all(later < earlier for earlier, later in pairwise(at)),
         "|r| " + ", ".join(f"{x:.2g}" for x in at) + " m after 100, 200, 300, 400 s",
     )
 
 
-def tracks_its_commands(on: Column) -> Finding:
-    """NFTSM from 30 deg: heading rate, airspeed, altitude."""
-    found = on.measured(flight("30", "NFTSM", Reading(period=0.05)))
+def _quantity(x: float | None, unit: str, digits: str = ".2g") -> str:
+    return "not measured" if x is None else f"{round(x, 6):{digits}} {unit}"
+
+
+def tracks_its_commands(on: Column) -> Decision:
+    """NFTSM from 30 deg: heading rate, airspeed, altitude. The kinematic aircraft has no altitude to lose."""
+    metrics = on.measured(flight("30", "NFTSM", Reading(period=0.05)))
     rate, speed, height = (
-        found[name] or 0.0
+        metrics[name]
         for name in ("heading_rate_error_rms_deg_s", "airspeed_deviation_rms_mps", "altitude_deviation_peak_m")
     )
     most = 0.05 * on.limit
-    return holds(
-        rate < most and speed < 0.13 and height < 2.0,
-        f"heading rate {_told(rate)} deg/s rms off, airspeed {_told(speed)} m/s rms, altitude {_told(height)} "
-        "m at the most "
-        f"(allowed: {most:.3g}, 0.13, 2)",
+    return decide(
+        every(less(rate, most), less(speed, 0.13), less(height, 2.0)),
+        f"heading rate {_quantity(rate, 'deg/s')} rms off, airspeed {_quantity(speed, 'm/s')} rms, altitude "
+        f"{_quantity(height, 'm')} at the most (allowed: {most:.3g}, 0.13, 2)",
     )
 
 
-def _told(x: float) -> str:
-    return f"{round(x, 6):.2g}"
-
-
-def coordinated(on: Column) -> Finding:
+def coordinated(on: Column) -> Decision:
     """NFTSM from 30 deg: does it turn as a coordinated aircraft does?"""
-    found = on.measured(flight("30", "NFTSM", Reading(period=0.05)))
-    ratio, sideslip = found["turn_ratio"], found["sideslip_peak_deg"]
-    if ratio is None or sideslip is None:
-        return holds(True, "it is the model itself: no bank, no sideslip")
-    return holds(
-        abs(ratio - 1.0) < 0.05 and sideslip < 2.0,
-        f"heading rate over g tan φ / V {ratio:.3f}, sideslip up to {sideslip:.2g}° (allowed: 5 % and 2°)",
+    metrics = on.measured(flight("30", "NFTSM", Reading(period=0.05)))
+    ratio, sideslip = metrics["turn_ratio"], metrics["sideslip_peak_deg"]
+    if not on.aircraft:
+        return decide(True, "the kinematic aircraft is the model itself: it has neither bank nor sideslip")
+    off = None if ratio is None else abs(ratio - 1.0)
+    return decide(
+        every(less(off, 0.05), less(sideslip, 2.0)),
+        f"heading rate {_quantity(ratio, 'times g tan φ / V', '.3f')}, sideslip up to {_quantity(sideslip, '°')} "
+        "(allowed: 5 % and 2°)",
     )
 
 
-def flies_by_course(on: Column) -> Finding:
+def flies_by_course(on: Column) -> Decision:
     """NFTSM in 3.6 m/s of wind, by heading and by course, limited to 10 deg/s."""
     one = replace(own("NFTSM", Target(), 100.0, 10.0), wind=Wind(steady=(3.0, 2.0)))
     by_course = replace(one, law=law(*LAWS["NFTSM"], max_heading_rate=math.radians(10.0), command="course_rate"))
     times = [settled(on.fly(each), 1.0) for each in (one, by_course)]
-    return holds(
+    return decide(
         times[1] is not None,
         f"in 3.6 m/s of wind within 1 m {within(times[1])} by ground speed and course, {within(times[0])} by "
         "airspeed and heading",
@@ -98,7 +100,7 @@ def _straight(speed: float) -> Target:
 
 def _held(on: Column, speed: float, limit_deg_s: float) -> bool:
     try:
-        return peak(on.fly(own("NFTSM", _straight(speed), 300.0, limit_deg_s)), 200.0) < max(1.0, on.tolerance)
+        return peak(on.fly(own("NFTSM", _straight(speed), 300.0, limit_deg_s)), 200.0) < ON_THE_CIRCLE
     except EndedEarlyError:
         return False
 
@@ -112,9 +114,9 @@ def _fastest(one: Flight) -> float:
     return along + math.sqrt(w * w - across * across) if w > abs(across) else 0.0
 
 
-def remark_1_is_enough(on: Column) -> Finding:
+def remark_1_is_enough(on: Column) -> Decision:
     """The fastest straight target round which NFTSM keeps within 1 m, to 0.1 m/s, with the limit and without."""
-    found = []
+    found = []  # m/s, with the limit and without
     for limit in (5.0, math.inf):
         low, high = 0, 130  # tenths of a metre per second
         while high - low > 1:
@@ -122,26 +124,27 @@ def remark_1_is_enough(on: Column) -> Finding:
             low, high = (middle, high) if _held(on, middle / 10.0, limit) else (low, middle)
         found.append(low / 10.0)
     bound = _fastest(on.change(own("NFTSM", _straight(0.0), 300.0, 5.0)))
-    if not max(found):
-        return holds(False, "never within 1 m of the circle, at rest neither")
-    limited, free = (f"up to v_t = {most:.1f} m/s" if most else "not at 0.1 m/s" for most in found)
-    number = f"within 1 m of the circle {limited} at {on.limited} (the formula: {bound:.2f}), {free} without a limit"
-    if found[1] > 12.0 > found[0] > 0.0:
-        return holds_if("the limit allows (v_a + w)²/(v_a R_d)", True, number)
-    return holds(min(found) > 12.0, number)
+    limited, free = found
+    fast_limited, fast_free = (f"up to v_t = {most:.1f} m/s" if most else "not at 0.1 m/s" for most in found)
+    return decide(
+        min(found) > NEARLY_AS_FAST,
+        f"within 1 m of the circle {fast_limited} at {on.limited} (the formula: {bound:.2f}), {fast_free} without a "
+        "limit",
+        under={"the limit allows (v_a + w)²/(v_a R_d)": free > NEARLY_AS_FAST and limited > 0.0},
+    )
 
 
-def faster_target_flees(on: Column) -> Finding:
+def faster_target_flees(on: Column) -> Decision:
     """A target at 13.5 m/s."""
     log = on.fly(own("NFTSM", _straight(13.5), 600.0))
     away = [float(log["range_error"][np.searchsorted(log["time"], t)]) for t in (200.0, 400.0, 600.0)]
-    return holds(
+    return decide(
         away[2] > away[1] > away[0] > 1.0,
         "r " + ", ".join(f"{x:.0f}" for x in away) + " m after 200, 400, 600 s at v_t = 13.5 m/s",
     )
 
 
-def definition_1(on: Column) -> Finding:
+def definition_1(on: Column) -> Decision:
     """The three conditions: r and r' at the end, and for how long r r' > 0, from both starts."""
     told, fine = [], []
     for experiment, label in (("30", "NFTSM"), ("30", "NFTSM_1"), ("130", "NFTSM")):
@@ -154,25 +157,27 @@ def definition_1(on: Column) -> Finding:
             f"{label} from {experiment}°: r {metres(abs(r[-1]))}, ṙ {metres(abs(r_dot[-1]))}/s at the end, r ṙ "
             f"> 0 for {away:.1f} s"
         )
-    if all(fine):
-        return holds(True, "; ".join(told))
-    return holds_if("there is no overshoot and the start is not turned away", fine[0] and not fine[2], "; ".join(told))
+    return decide(
+        all(fine),
+        "; ".join(told),
+        under={"there is no overshoot and the start is not turned away": fine[0]},
+    )
 
 
 # Section 3
 
 
-def goes_round(on: Column) -> Finding:
+def goes_round(on: Column) -> Decision:
     """The azimuth of a slow target: does it go one way?"""
     log = on.paper("S", "NFTSM", duration=330.0)
     rate = np.diff(azimuth(log)[log["time"] > 100.0])
     one_way = bool((rate < 0.0).all())
-    return holds(
+    return decide(
         one_way, f"{turns(log, 100.0):.2f} turns in 230 s round 2 m/s, {'never' if one_way else 'at times'} back"
     )
 
 
-def follows_behind(on: Column) -> Finding:
+def follows_behind(on: Column) -> Decision:
     """A target at 11 m/s, straight, without a limit: how the aircraft goes round it."""
     log = on.fly(own("NFTSM", _straight(11.0), 700.0))
     late = log["time"] > 200.0
@@ -182,7 +187,7 @@ def follows_behind(on: Column) -> Finding:
     slowest = float(np.mod(seen[int(np.argmin(rate))] + 180.0, 360.0) - 180.0)
     round_ = turns(log, 200.0)
     once = 500.0 / max(round_, 1e-9)
-    return holds(
+    return decide(
         round_ < 0.5,
         f"at 11 of 13 m/s once round in {once:.0f} s, slowest ({rate.min():.2f} deg/s) "
         f"at {slowest:.0f}° from the target's heading (90° is abeam), fastest ({rate.max():.1f}); within 45° "
@@ -191,7 +196,7 @@ def follows_behind(on: Column) -> Finding:
     )
 
 
-def v1_falls(on: Column) -> Finding:
+def v1_falls(on: Column) -> Decision:
     """V1 = s^2/2 along the paper's flights, free and at the limit."""
     told, free_fine, limited_fine = [], True, True
     for experiment, label in (("30", "NFTSM"), ("130", "NFTSM"), ("30", "NFTSM_1")):
@@ -203,12 +208,10 @@ def v1_falls(on: Column) -> Finding:
         free_fine, limited_fine = free_fine and not while_free, limited_fine and not at_limit
         told.append(f"{label} from {experiment}° {while_free:.2g} s while free, {at_limit:.2g} s at the limit")
     number = "V1 rises: " + ", ".join(told)
-    if free_fine and not limited_fine:
-        return holds_if("the command is not at its limit", True, number)
-    return holds(free_fine, number)
+    return decide(free_fine and limited_fine, number, under={"the command is not at its limit": free_fine})
 
 
-def eq_25_bounds_the_flight(on: Column) -> Finding:
+def eq_25_bounds_the_flight(on: Column) -> Decision:
     """When |s| is down to 1e-3 rad, against Eq. (25), without a limit and with the paper's."""
     told: list[str] = []
     times, bound = [], 0.0
@@ -225,32 +228,30 @@ def eq_25_bounds_the_flight(on: Column) -> Finding:
             f"{f'at {on.limited}' if told else 'without a limit'}"
         )
     number = f"the bound is {bound:.2f} s; |s| is below 1e-3 after " + ", ".join(told)
-    if times[0] <= bound < times[1]:
-        return holds_if("there is no limit", True, number)
-    return holds(max(times) <= bound, number)
+    return decide(max(times) <= bound, number, under={"there is no limit": times[0] <= bound})
 
 
-def reaches_zero(on: Column) -> Finding:
+def reaches_zero(on: Column) -> Decision:
     """Theorem 1 in flight: the way from 10 mm to 1e-6 m."""
     log = on.fly(own("NFTSM", Target(), 60.0, 5.0, 0.001 if on.tolerance < 1e-3 else 0.05))
     r, time = np.abs(log["range_error"]), log["time"]
     falling = (r < 1e-3) & (r > 1e-5)
     g = log.flight.law
     assert isinstance(g, Nftsm)
-    if falling.sum() < 10 or r[-1] > 1e-3:
-        return holds(False, f"r is {rms(log, 40.0):.2g} m rms from 40 s on")
-    rate = -float(np.polyfit(time[falling], np.log(r[falling]), 1)[0])
-    return holds_if(
-        "zero means a tolerance", abs(rate / inner_rate(g) - 1.0) < 0.05,
-        f"inside η r falls as e^(−{rate:.2f} t) ({inner_rate(g):.2f} by the manifold's slope): 1e-4 m "
-        f"{within(settled(log))}, never zero",
-    )  # fmt: skip
+    rate = -float(np.polyfit(time[falling], np.log(r[falling]), 1)[0]) if falling.sum() >= 10 else math.nan
+    falls = "" if math.isnan(rate) else f", inside η as e^(−{rate:.2f} t) ({inner_rate(g):.2f} by the manifold's slope)"
+    return decide(
+        bool(r[-1] == 0.0),
+        f"1e-4 m {within(settled(log))}, {metres(float(r[-1]))} at the end, {metres(rms(log, 40.0))} rms from 40 s on"
+        f"{falls}",
+        under={"zero means a tolerance": bool(r[-1] < 1e-3 and abs(rate / inner_rate(g) - 1.0) < 0.05)},
+    )
 
 
 # Section 4
 
 
-def sampling(on: Column, label: str) -> Finding:
+def sampling(on: Column, label: str) -> Decision:
     """The longest guidance period, of those that the column tries, at which the law converges from 30 deg."""
     limited = _converging(on, label, flight("30", label).law)
     told = [f"from 30° to {tolerance:g} m {_longest(each)}" for tolerance, each in limited.items()]
@@ -260,7 +261,7 @@ def sampling(on: Column, label: str) -> Finding:
         for i, (tolerance, each) in enumerate(unlimited.items()):
             bound = longest_stable_period(free, manifold(free, math.atan(free.k1 * tolerance))[0])
             told[i] += f", unlimited {_longest(each)} (the bound from k2 and k3: {_period(bound)})"
-    return holds(limited[1.0][0.5], "; ".join(told))
+    return decide(limited[1.0][0.5], "; ".join(told))
 
 
 def _converging(on: Column, label: str, steering: Law) -> dict[float, dict[float, bool]]:
@@ -303,21 +304,21 @@ def _period(seconds: float) -> str:
     return f"{1000.0 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:g} s"
 
 
-def nftsm_sampling(on: Column) -> Finding:
+def nftsm_sampling(on: Column) -> Decision:
     """NFTSM with the fitted gains."""
     return sampling(on, "NFTSM")
 
 
-def nftsm_1_sampling(on: Column) -> Finding:
+def nftsm_1_sampling(on: Column) -> Decision:
     """NFTSM_1."""
     return sampling(on, "NFTSM_1")
 
 
-def printed_sampling(on: Column) -> Finding:
+def printed_sampling(on: Column) -> Decision:
     """NFTSM with the gains of Table 2."""
     return sampling(on, "NFTSM as printed")
 
 
-def smc_sampling(on: Column) -> Finding:
+def smc_sampling(on: Column) -> Decision:
     """The traditional law."""
     return sampling(on, "SMC")

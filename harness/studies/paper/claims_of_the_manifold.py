@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.nftsm import Nftsm, reaching
 from harness.studies.paper.claims_of_geometry import EXACT, V_A, nftsm
-from harness.studies.paper.ledger import Finding, below, holds, holds_if
+from harness.studies.paper.decision import Decision, all_less, below, decide, every, largest, less
 from harness.studies.paper.theory import (
     boundary_heading_error,
     ftsm_time,
@@ -24,11 +25,15 @@ Array = NDArray[np.float64]
 # Section 3.2
 
 
-def exponential_mode() -> Finding:
-    """X' = -alpha x from 5: e^-1 after 1/alpha."""
-    x = _mode(5.0, 1.0, 1.0, 2.0)
+def exponential_mode_numbers() -> tuple[float]:
+    """X after 2 s of x' = -x from 5: 5 e^-2."""
+    return (_mode(5.0, 1.0, 1.0, 2.0),)
+
+
+def exponential_mode(x: float) -> Decision:
+    """`x` after 2 s."""
     off = abs(x / (5.0 * math.exp(-2.0)) - 1.0)
-    return holds(off < 1e-6, f"x(2 s) = {x:.5f} from 5, {below(off)} off 5 e^-2")
+    return decide(less(off, 1e-6), f"x(2 s) = {x:.5f} from 5, {below(off)} off 5 e^-2")
 
 
 def _mode(x0: float, alpha: float, beta: float, time: float) -> float:
@@ -41,41 +46,63 @@ def _mode(x0: float, alpha: float, beta: float, time: float) -> float:
     return float(solve_ivp(slope, (0.0, time), [x0], rtol=1e-10, atol=1e-12).y[0, -1])
 
 
-def terminal_mode() -> Finding:
-    """0 < beta < 1: finite time."""
+def terminal_mode_numbers() -> tuple[float, float, float]:
+    """0 < beta < 1: the time to zero, and x just before and just after."""
     time = tsm_time(5.0, 1.0, 0.5)
-    before, after = _mode(5.0, 1.0, 0.5, 0.99 * time), _mode(5.0, 1.0, 0.5, 1.01 * time)
-    return holds(before > 1e-5 > after, f"β1 = 0.5, α1 = 1, from 5: zero after {time:.3f} s")
+    return time, _mode(5.0, 1.0, 0.5, 0.99 * time), _mode(5.0, 1.0, 0.5, 1.01 * time)
 
 
-def steep_mode() -> Finding:
-    """Beta > 1: fast far away, and never there."""
-    fast, linear = _mode(5.0, 1.0, 2.0, 0.5), _mode(5.0, 1.0, 1.0, 0.5)
-    late = _mode(5.0, 1.0, 2.0, 100.0)
-    return holds(
-        fast < linear and late > 1e-3,
-        f"β1 = 2 from 5: {fast:.2f} after 0.5 s (β1 = 1: {linear:.2f}), yet {late:.4f} after 100 s",
+def terminal_mode(time: float, before: float, after: float) -> Decision:
+    """X `before` and `after` the `time`, s."""
+    return decide(
+        every(less(1e-5, before), less(after, 1e-5)),
+        f"β1 = 0.5, α1 = 1, from 5: {time:.3f} s by the formula; x is {before:.1g} at 99 % of it, {below(abs(after))} "
+        "at 101 %",
     )
 
 
-def rate_over_distance() -> Finding:
-    """The relative rate of convergence, alpha |x|^(beta-1), is no inverse of the distance for any beta > 1."""
+def steep_mode_numbers() -> tuple[float, float, float]:
+    """Beta = 2 and 1 after 0.5 s, and beta = 2 after 100 s."""
+    return _mode(5.0, 1.0, 2.0, 0.5), _mode(5.0, 1.0, 1.0, 0.5), _mode(5.0, 1.0, 2.0, 100.0)
+
+
+def steep_mode(steep: float, linear: float, late: float) -> Decision:
+    """X with beta = 2 and with beta = 1 after 0.5 s; with beta = 2 after 100 s."""
+    return decide(
+        every(less(steep, linear), less(1e-3, late)),
+        f"β1 = 2 from 5: {steep:.2f} after 0.5 s (β1 = 1: {linear:.2f}), {late:.4f} after 100 s",
+    )
+
+
+def rate_over_distance_numbers() -> tuple[float, float]:
+    """The relative rate of convergence, alpha |x|^(beta-1), at 0.1 and at 1, for beta = 2, 1/s."""
     near, far = (1.0 * x ** (2.0 - 1.0) for x in (0.1, 1.0))
-    return holds(
-        near > far, f"it grows with the distance, as |x|^(β1−1): {near:g} /s at 0.1, {far:g} /s at 1 for β1 = 2"
+    return near, far
+
+
+def rate_over_distance(near: float, far: float) -> Decision:
+    """The rates `near` zero and `far` from it."""
+    return decide(less(far, near), f"the rate |x|^(β1−1) is {near:g} /s at 0.1, {far:g} /s at 1 for β1 = 2")
+
+
+_ALPHAS = (0.5, 1.0, 2.0, 4.0)
+
+
+def monotone_in_alpha_numbers() -> tuple[float, ...]:
+    """Remark 3's times as alpha rises."""
+    return tuple(tsm_time(5.0, alpha, 0.5) for alpha in _ALPHAS)
+
+
+def monotone_in_alpha(*times: float) -> Decision:
+    """The `times` as alpha rises, s."""
+    return decide(
+        every(*(less(later, earlier) for earlier, later in pairwise(times))),
+        f"α1 = {', '.join(f'{alpha:g}' for alpha in _ALPHAS)}: " + ", ".join(f"{t:.2f}" for t in times) + " s",
     )
 
 
-def monotone_in_alpha() -> Finding:
-    """Remark 3's time falls as alpha rises."""
-    times = [tsm_time(5.0, alpha, 0.5) for alpha in (0.5, 1.0, 2.0, 4.0)]
-    return holds(
-        times == sorted(times, reverse=True), "α1 = 0.5, 1, 2, 4: " + ", ".join(f"{t:.2f}" for t in times) + " s"
-    )
-
-
-def remark_3() -> Finding:
-    """The closed form against quadrature."""
+def remark_3_numbers() -> tuple[float]:
+    """The closed form off quadrature, as a share."""
     from scipy.integrate import quad
 
     worst = 0.0
@@ -83,52 +110,82 @@ def remark_3() -> Finding:
         for alpha in (0.5, 2.0):
             for beta in (0.2, 0.5, 0.8):
                 integral, _ = quad(lambda u, e=1.0 - beta, a=alpha: 1.0 / (a * e), 0.0, x0 ** (1.0 - beta))
-                worst = max(worst, abs(tsm_time(x0, alpha, beta) / integral - 1.0))
-    return holds(worst < EXACT, f"{below(worst)} off the integral")
+                worst = largest(worst, abs(tsm_time(x0, alpha, beta) / integral - 1.0))
+    return (worst,)
 
 
-def figure_3() -> Finding:
-    """The times of s1, s2, s3 from 6."""
-    s1, s2, s3 = tsm_time(6.0, 1.0, 0.5), ftsm_time(6.0, 1.0, 3.0, 1.0, 0.5), ftsm_time(6.0, 1.0, 1.0, 1.0, 0.5)
-    return holds(s2 < s1 and s3 < s1, f"from 6: s1 {s1:.2f} s, s2 {s2:.2f} s, s3 {s3:.2f} s")
+def remark_3(off: float) -> Decision:
+    """`off` the integral."""
+    return decide(less(off, EXACT), f"{below(off)} off the integral")
 
 
-def dominance() -> Finding:
-    """Where the two terms of Eq. (12) are equal, for the gains of Table 2."""
-    told, right = [], []
-    for name in ("NFTSM_1", "NFTSM", "NFTSM as printed"):
-        g = nftsm(name)
-        cross = (g.alpha3 / g.alpha2) ** (1.0 / (g.beta2 - g.beta3))
-        near = 1e-3
-        right.append(g.alpha3 * near**g.beta3 > g.alpha2 * near**g.beta2)
-        told.append(f"{name} beyond |ℓ| = {cross:.2f}" if right[-1] else f"{name} everywhere, near zero most of all")
-    return holds_if(
-        "β2 > β3", right == [True, True, False], "the α2 term dominates for " + ", ".join(told) + " (β2 = 0.2)"
+def figure_3_numbers() -> tuple[float, float, float]:
+    """The times of s1, s2, s3 from 6, s."""
+    return tsm_time(6.0, 1.0, 0.5), ftsm_time(6.0, 1.0, 3.0, 1.0, 0.5), ftsm_time(6.0, 1.0, 1.0, 1.0, 0.5)
+
+
+def figure_3(s1: float, s2: float, s3: float) -> Decision:
+    """The times of the three modes, s."""
+    return decide(every(less(s2, s1), less(s3, s1)), f"from 6: s1 {s1:.2f} s, s2 {s2:.2f} s, s3 {s3:.2f} s")
+
+
+_TABLE_2 = ("NFTSM_1", "NFTSM", "NFTSM as printed")
+
+
+_NEAR, _FAR = 1e-3, 1.5  # |ell|: close to zero, and close to its largest value, pi/2
+
+
+def dominance_numbers() -> tuple[float, ...]:
+    """The alpha3 term over the alpha2 term of Eq. (12), for each set of `_TABLE_2` at `_NEAR`, then at `_FAR`."""
+    sets = [nftsm(name) for name in _TABLE_2]
+    return tuple(g.alpha3 * ell**g.beta3 / (g.alpha2 * ell**g.beta2) for ell in (_NEAR, _FAR) for g in sets)
+
+
+def dominance(*ratios: float) -> Decision:
+    """The alpha3 term over the alpha2 term: three sets of gains near zero, then far from it."""
+    near, far = ratios[:3], ratios[3:]
+    sets = [
+        f"{name} (β2 = {nftsm(name).beta2:g}) {a:.2g} and {b:.2g}"
+        for name, a, b in zip(_TABLE_2, near, far, strict=True)
+    ]
+    steep = every(less(1.0, near[0]), less(1.0, near[1]), all_less(far[:2], 1.0))  # beta2 > beta3
+    return decide(
+        every(steep, less(1.0, near[2]), less(far[2], 1.0)),
+        f"the α3 term over the α2 term at |ℓ| = {_NEAR:g} and {_FAR:g}: " + ", ".join(sets),
+        under={"β2 > β3": steep},
     )
 
 
-def without_the_fast_term() -> Finding:
-    """With alpha2 = 0 the manifold of Eq. (12) is that of Eq. (11)."""
+def without_the_fast_term_numbers() -> tuple[float]:
+    """With alpha2 = 0 the manifold of Eq. (12) off that of Eq. (11), outside eta, rad."""
     g = replace(nftsm("NFTSM"), alpha2=0.0)
-    worst = max(abs(manifold(g, x)[0] - g.alpha3 * x**g.beta3) for x in (0.002, 0.1, 1.0, 1.5))
-    return holds(worst < EXACT, f"{below(worst)} off α3 sig^β3 outside η; the law flown as TSM, Eq. (34), is another")
+    return (largest(*(abs(manifold(g, x)[0] - g.alpha3 * x**g.beta3) for x in (0.002, 0.1, 1.0, 1.5))),)
 
 
-def remark_4() -> Finding:
-    """The printed closed form, and the corrected one, against quadrature."""
+def without_the_fast_term(off: float) -> Decision:
+    """`off` Eq. (11), rad."""
+    return decide(less(off, EXACT), f"{below(off)} off α3 sig^β3 outside η")
+
+
+def remark_4_numbers() -> tuple[float, float, float]:
+    """The closed form as printed, the corrected one, and quadrature, s."""
     from scipy.integrate import quad
 
     integral, _ = quad(lambda u: 2.0 / (u**5 + 1.0), 0.0, math.sqrt(6.0))  # dx / (x^3 + x^0.5) in u = x^0.5
-    printed, corrected = printed_ftsm_time(6.0, 1.0, 3.0, 1.0, 0.5), ftsm_time(6.0, 1.0, 3.0, 1.0, 0.5)
-    return holds(
-        abs(printed - integral) < 1e-6,
+    return printed_ftsm_time(6.0, 1.0, 3.0, 1.0, 0.5), ftsm_time(6.0, 1.0, 3.0, 1.0, 0.5), integral
+
+
+def remark_4(printed: float, corrected: float, integral: float) -> Decision:
+    """The time as `printed`, as `corrected`, and the `integral`, s."""
+    return decide(
+        less(abs(printed - integral), 1e-6),
         f"s2 of Figure 3 from 6: printed {printed:.4f} s, the integral {integral:.4f} s; the form with its limit at 0 "
         f"taken off gives {corrected:.4f} s",
     )
 
 
-def hypergeometric_examples() -> Finding:
-    """The three special values after Remark 4."""
+def hypergeometric_examples_numbers() -> tuple[float]:
+    """The largest error of the three special values after Remark 4."""
     from scipy.special import hyp2f1
 
     off: list[float] = []
@@ -136,16 +193,25 @@ def hypergeometric_examples() -> Finding:
         off.append(float(hyp2f1(-3.0, 0.7, 0.7, -z)) - (1.0 + z) ** 3)
         off.append(float(hyp2f1(1.0, 1.0, 2.0, -z)) - math.log(1.0 + z) / z)
         off.append(float(hyp2f1(0.5, 1.0, 1.5, -z * z)) - math.atan(z) / z)
-    worst = max(map(abs, off))
-    return holds(worst < EXACT, f'{below(worst)} off, reading "ln 1+z / z" as ln(1 + z)/z')
+    return (largest(*map(abs, off)),)
 
 
-def singular_tsm() -> Finding:
-    """The slope of Eq. (13) near 0."""
-    slopes = [(2.0 / 3.0) * x ** (2.0 / 3.0 - 1.0) for x in (1e-3, 1e-6, 1e-9)]
-    return holds(
-        slopes[2] > 10.0 * slopes[1] > 90.0 * slopes[0],
-        f"the slope is {slopes[0]:.0f}, {slopes[1]:.0f}, {slopes[2]:.0f} at x = 1e-3, 1e-6, 1e-9",
+def hypergeometric_examples(off: float) -> Decision:
+    """`off` the special values."""
+    return decide(less(off, EXACT), f'{below(off)} off, reading "ln 1+z / z" as ln(1 + z)/z')
+
+
+def singular_tsm_numbers() -> tuple[float, float, float]:
+    """The slope of Eq. (13) at x = 1e-3, 1e-6, 1e-9."""
+    a, b, c = ((2.0 / 3.0) * x ** (2.0 / 3.0 - 1.0) for x in (1e-3, 1e-6, 1e-9))
+    return a, b, c
+
+
+def singular_tsm(far: float, near: float, nearest: float) -> Decision:
+    """The slopes."""
+    return decide(
+        every(less(9.0 * far, near), less(9.0 * near, nearest)),
+        f"the slope is {far:.0f}, {near:.0f}, {nearest:.0f} at x = 1e-3, 1e-6, 1e-9",
     )
 
 
@@ -156,18 +222,28 @@ def manifold(g: Nftsm, ell: float) -> tuple[float, float]:
     return f, -(rest + reached) / (g.k1 * math.cos(ell) ** 2)
 
 
-def nonsingular() -> Finding:
-    """The slope of the manifold near 0 with the three sets of gains."""
-    slopes = {name: manifold(nftsm(name), 1e-9)[1] for name in ("NFTSM", "NFTSM_1", "NFTSM as printed")}
-    told = ", ".join(f"{name} {slope:.3g}" for name, slope in slopes.items())
-    return holds_if(
-        "β2 ≥ 1", slopes["NFTSM"] < 10.0 and slopes["NFTSM_1"] < 10.0 < slopes["NFTSM as printed"],
-        f"slope of the manifold at ℓ = 1e-9: {told} (β2 = 0.2, Table 2)",
-    )  # fmt: skip
+def nonsingular_numbers() -> tuple[float, float, float]:
+    """The slope of the manifold at |ell| = 1e-9, for each set of `_TABLE_2`."""
+    a, b, c = (manifold(nftsm(name), 1e-9)[1] for name in _TABLE_2)
+    return a, b, c
 
 
-def continuous_slope() -> Finding:
-    """Sigma and its derivative at +eta and -eta: as corrected, and as printed, with r1 + 2 r2 x for negative x."""
+def nonsingular(nftsm_1: float, fitted: float, printed: float) -> Decision:
+    """The slopes with three sets of gains."""
+    sets = zip(_TABLE_2, (nftsm_1, fitted, printed), strict=True)
+    return decide(
+        all_less((nftsm_1, fitted, printed), 10.0),
+        "slope of the manifold at ℓ = 1e-9: "
+        + ", ".join(f"{name} (β2 = {nftsm(name).beta2:g}) {slope:.3g}" for name, slope in sets),
+        under={"β2 ≥ 1": all_less((nftsm_1, fitted), 10.0)},
+    )
+
+
+def continuous_slope_numbers() -> tuple[float, float]:
+    """Jumps of sigma and of its slope at +eta and -eta, as shares: the largest as corrected, the slope's as printed.
+
+    Printed is r1 + 2 r2 x for negative x too.
+    """
     g = nftsm("NFTSM")
     eta, beta3 = g.eta, g.beta3
     jumps = []
@@ -176,98 +252,134 @@ def continuous_slope() -> Finding:
         jumps += [abs(inside[0] / outside[0] - 1.0), abs(inside[1] / outside[1] - 1.0)]
     r1, r2 = (2.0 - beta3) * eta ** (beta3 - 1.0), (beta3 - 1.0) * eta ** (beta3 - 2.0)
     printed, outer = r1 + 2.0 * r2 * -eta, beta3 * eta ** (beta3 - 1.0)
-    return holds_if(
-        "Eq. (16) has |x| in r1 + 2 r2 x",
-        max(jumps) < 1e-6 and printed > 2.0 * outer,
-        f"jumps of {below(max(jumps))} at ±η then; as printed the slope of σ at −η is "
-        f"{printed / outer:.1f} times that outside",
+    return largest(*jumps), abs(printed / outer - 1.0)
+
+
+def continuous_slope(corrected: float, printed: float) -> Decision:
+    """The jumps as `corrected` and as `printed`, shares."""
+    return decide(
+        every(less(corrected, 1e-6), less(printed, 1e-6)),
+        f"with |x| in r1 + 2 r2 |x| the jumps at ±η are {below(corrected)}; as printed the slope of σ at −η is off "
+        f"that outside η by {100.0 * printed:.3g} %",
+        under={"Eq. (16) has |x| in r1 + 2 r2 x": less(corrected, 1e-6)},
     )
 
 
 # Section 3.4
 
 
-def lemma_1() -> Finding:
-    """Eq. (22) against the integral of dV / (a V + b V^c)."""
+def lemma_1_numbers() -> tuple[float]:
+    """Eq. (22) off the integral of dV / (a V + b V^c), as a share."""
     from scipy.integrate import quad
 
     worst = 0.0
     for a, b, c, V0 in ((1.0, 2.0, 0.5, 3.0), (24.0, 11.6, 0.95, 1.0), (0.3, 0.1, 0.2, 10.0)):
         bound = math.log((a * V0 ** (1.0 - c) + b) / b) / (a * (1.0 - c))
         integral, _ = quad(lambda u, a=a, b=b, c=c: 1.0 / ((1.0 - c) * (a * u + b)), 0.0, V0 ** (1.0 - c))
-        worst = max(worst, abs(bound / integral - 1.0))
-    return holds(worst < EXACT, f"with equality in (21) it is the time itself, to {below(worst)}")
+        worst = largest(worst, abs(bound / integral - 1.0))
+    return (worst,)
 
 
-def reaching_bound() -> Finding:
-    """Eq. (25) against quadrature of Eq. (18)."""
+def lemma_1(off: float) -> Decision:
+    """`off` the integral, a share."""
+    return decide(less(off, EXACT), f"with equality in (21) it is off the time itself by {below(off)}")
+
+
+def reaching_bound_numbers() -> tuple[float, float]:
+    """Eq. (25) off quadrature of Eq. (18), as a share; and the time from s = 1 rad, s."""
     from scipy.integrate import quad
 
     g, worst = nftsm("NFTSM"), 0.0
     for s0 in (0.1, 1.0, 3.0):
         integral, _ = quad(lambda u: 1.0 / ((1.0 - g.gamma1) * (g.k2 * u + g.k3)), 0.0, s0 ** (1.0 - g.gamma1))
-        worst = max(worst, abs(reaching_time(g, s0) / integral - 1.0))
-    return holds(
-        worst < 1e-8, f"it is the reaching time itself, to {below(worst)}: {reaching_time(g, 1.0):.3f} s from s = 1 rad"
+        worst = largest(worst, abs(reaching_time(g, s0) / integral - 1.0))
+    return worst, reaching_time(g, 1.0)
+
+
+def reaching_bound(off: float, time: float) -> Decision:
+    """`off` the reaching time, a share; the `time` from 1 rad, s."""
+    return decide(less(off, 1e-8), f"it is off the reaching time itself by {below(off)}: {time:.3f} s from s = 1 rad")
+
+
+def eq_28_numbers() -> tuple[float, float, float]:
+    """The reach of the manifolds of `_TABLE_2`, rad."""
+    a, b, c = (manifold_reach(nftsm(name)) for name in _TABLE_2)
+    return a, b, c
+
+
+def eq_28(nftsm_1: float, fitted: float, printed: float) -> Decision:
+    """The reach with three sets of gains, rad."""
+    sets = zip(_TABLE_2, (nftsm_1, fitted, printed), strict=True)
+    return decide(
+        all_less((nftsm_1, fitted, printed), math.pi + EXACT),
+        f"{', '.join(f'{name} {x:.2f}' for name, x in sets)} rad against π",
+        under={"NFTSM_1 is left out": all_less((fitted, printed), math.pi + EXACT)},
     )
 
 
-def eq_28() -> Finding:
-    """The reach of the manifolds of Table 2."""
-    reach = {name: manifold_reach(nftsm(name)) for name in ("NFTSM as printed", "NFTSM", "NFTSM_1")}
-    told = ", ".join(f"{name} {x:.2f}" for name, x in reach.items())
-    return holds_if(
-        "NFTSM_1 is left out",
-        reach["NFTSM_1"] > math.pi > reach["NFTSM"] > reach["NFTSM as printed"],
-        f"{told} rad against π",
+def eq_30_numbers() -> tuple[float, float, float, float, float]:
+    """The reach plus arcsin xi, deg: a target at rest for each set of `_TABLE_2`; one at 2 m/s, fitted and printed."""
+    reach = [manifold_reach(nftsm(name)) for name in _TABLE_2]
+    rest = [math.degrees(x) for x in reach]
+    moving = [math.degrees(math.asin(2.0 / V_A) + x) for x in reach[1:]]
+    return rest[0], rest[1], rest[2], moving[0], moving[1]
+
+
+def eq_30(nftsm_1: float, fitted: float, printed: float, moving_fitted: float, moving_printed: float) -> Decision:
+    """The left sides of Eq. (30), deg."""
+    return decide(
+        all_less((nftsm_1, fitted, printed, moving_fitted, moving_printed), 90.0),
+        f"against 90°, target at rest: printed {printed:.1f}°, fitted {fitted:.1f}°, NFTSM_1 {nftsm_1:.0f}°; at 2 m/s: "
+        f"printed {moving_printed:.1f}°, fitted {moving_fitted:.1f}°",
+        under={
+            "the gains are not NFTSM_1's": all_less((fitted, printed, moving_fitted, moving_printed), 90.0),
+            "the gains are those printed for NFTSM, or the fitted ones and the target rests": all_less(
+                (fitted, printed, moving_printed), 90.0
+            ),
+        },
     )
 
 
-def eq_30() -> Finding:
-    """The reach plus arcsin xi, for Section 4's targets and wind."""
-
-    def left(name: str, speed: float, wind: float) -> float:
-        return math.degrees(math.asin((speed + wind) / V_A) + manifold_reach(nftsm(name)))
-
-    still = {name: left(name, 0.0, 0.0) for name in ("NFTSM as printed", "NFTSM", "NFTSM_1")}
-    moving = {name: left(name, 2.0, 0.0) for name in ("NFTSM as printed", "NFTSM")}
-    return holds_if(
-        "the gains are the printed ones of NFTSM, or the target rests",
-        still["NFTSM"] < 90.0 < min(moving["NFTSM"], still["NFTSM_1"]) and moving["NFTSM as printed"] < 90.0,
-        f"against 90°, target at rest: printed {still['NFTSM as printed']:.1f}°, fitted {still['NFTSM']:.1f}°, "
-        f"NFTSM_1 {still['NFTSM_1']:.0f}°; at 2 m/s: printed {moving['NFTSM as printed']:.1f}°, fitted "
-        f"{moving['NFTSM']:.1f}°",
-    )
-
-
-def eq_31() -> Finding:
-    """Where on the manifold, in still air, V2 rises: f(ell) beyond pi."""
-    told, fine = [], []
+def eq_31_numbers() -> tuple[float, float]:
+    """Up to which |r| V2 falls on the manifold, in still air, for NFTSM and NFTSM_1, m; inf up to 400 m."""
+    falls_to = []
     for name in ("NFTSM", "NFTSM_1"):
         g = nftsm(name)
         r = np.linspace(0.1, 400.0, 4000)
         falls = np.array([math.sin(-manifold(g, math.atan(g.k1 * x))[0]) for x in r.tolist()]) <= 0.0
-        fine.append(bool(falls.all()))
-        told.append(
-            f"{name} at every |r| up to 400 m"
-            if fine[-1]
-            else f"{name} up to |r| = {r[int(np.argmin(falls))]:.1f} m only"
-        )
-    return holds_if("Eq. (28) does", fine == [True, False], "V̇2 ≤ 0 on the manifold for " + ", ".join(told))
+        falls_to.append(math.inf if falls.all() else float(r[int(np.argmin(falls))]))
+    return falls_to[0], falls_to[1]
 
 
-def eq_33() -> Finding:
-    """Eq. (32), (33): the heading error on the manifold within eta."""
+def eq_31(fitted: float, nftsm_1: float) -> Decision:
+    """Up to which |r| V2 falls, with the fitted gains, within Eq. (28), and with NFTSM_1's, beyond it; m."""
+
+    def span(x: float) -> str:
+        return "at every |r| up to 400 m" if x == math.inf else f"up to |r| = {x:.1f} m only"
+
+    return decide(
+        every(less(400.0, fitted), less(400.0, nftsm_1)),
+        f"V̇2 ≤ 0 on the manifold for NFTSM {span(fitted)}, NFTSM_1 {span(nftsm_1)}",
+        under={"Eq. (28) does, as with NFTSM's gains": less(400.0, fitted)},
+    )
+
+
+def eq_33_numbers() -> tuple[float, float]:
+    """Eq. (32), (33): the largest heading error within eta over the bound; the bound for NFTSM, rad."""
     worst = 0.0
     for name in ("NFTSM", "NFTSM_1"):
         g = nftsm(name)
-        worst = max(
-            worst,
-            max(abs(manifold(g, ell)[0]) for ell in np.linspace(-g.eta, g.eta, 401).tolist())
-            / boundary_heading_error(g),
-        )
-    bound = math.degrees(boundary_heading_error(nftsm("NFTSM")))
-    return holds(worst <= 1.0 + EXACT, f"largest {worst:.4f} of the bound, which is {bound:.3f}° for NFTSM")
+        errors = [abs(manifold(g, ell)[0]) for ell in np.linspace(-g.eta, g.eta, 401).tolist()]
+        worst = largest(worst, largest(*errors) / boundary_heading_error(g))
+    return worst, boundary_heading_error(nftsm("NFTSM"))
+
+
+def eq_33(worst: float, bound: float) -> Decision:
+    """The largest heading error over the `bound`, and the bound, rad."""
+    return decide(
+        less(worst, 1.0 + EXACT),
+        f"largest {worst:.4f} of the bound, which is {math.degrees(bound):.3f}° for NFTSM",
+    )
 
 
 def inner_rate(g: Nftsm) -> float:
@@ -275,14 +387,22 @@ def inner_rate(g: Nftsm) -> float:
     return float(V_A * g.k1 * g.alpha3 * (2.0 - g.beta3) * g.eta ** (g.beta3 - 1.0))
 
 
-def finite_time_scalar() -> Finding:
-    """Theorem 1 for the manifold alone: the way through eta is exponential."""
+def finite_time_scalar_numbers() -> tuple[float, float, float, float]:
+    """Theorem 1 for the manifold alone: the edge of eta, m; what is left of it after 20 s, m; the rates inside, 1/s.
+
+    The second rate is that with an eta ten times smaller.
+    """
     g = nftsm("NFTSM")
-    smaller = replace(g, eta=g.eta / 10.0)
-    return holds_if(
-        "zero means a tolerance",
-        inner_rate(g) > 0.0,
-        f"inside |ℓ| ≤ η, |r| ≤ {1000.0 * math.tan(g.eta) / g.k1:.0f} mm, the manifold is linear in r and r falls as "
-        f"e^(−{inner_rate(g):.2f} t): never zero, but a factor 10 each {math.log(10.0) / inner_rate(g):.2f} s (η ten "
-        f"times smaller: {math.log(10.0) / inner_rate(smaller):.2f} s)",
+    edge, rate = math.tan(g.eta) / g.k1, inner_rate(g)
+    return edge, edge * math.exp(-rate * 20.0), rate, inner_rate(replace(g, eta=g.eta / 10.0))
+
+
+def finite_time_scalar(edge: float, left: float, rate: float, rate_smaller: float) -> Decision:
+    """The `edge` of eta and what is `left` after 20 s, m; the `rate` inside, and with a smaller eta, 1/s."""
+    tenfold, smaller = (math.log(10.0) / x if x else math.inf for x in (rate, rate_smaller))
+    return decide(
+        None if math.isnan(left) else left == 0.0,
+        f"inside |ℓ| ≤ η, |r| ≤ {1000.0 * edge:.0f} mm, the manifold is linear in r and r falls as e^(−{rate:.2f} t), "
+        f"by a factor 10 each {tenfold:.2f} s (η ten times smaller: {smaller:.2f} s), to {left:.1g} m in 20 s",
+        under={"zero means a tolerance": less(left, 1e-6)},
     )

@@ -1,11 +1,14 @@
 """The columns of the ledgers: on which aircraft, and in what condition, the paper's experiments are flown."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import NamedTuple
 
+import numpy as np
+
+import aircraft
 from autopilot.guidance import Law
 from autopilot.laws import LAWS as KINDS
 from autopilot.nftsm import Nftsm
@@ -13,8 +16,7 @@ from autopilot.smc import Smc
 from harness.flight import Flight
 from harness.loop import simulate
 from harness.metric import measure
-from harness.plants.plant import Outcome
-from harness.plants.turn import bank_of_turn
+from harness.plants.turn import bank_of_turn, rate_of_turn
 from harness.studies.paper.experiments import EKF, LAWS, Reading, Trace, ending, flight, flown
 
 PAPERS_AIRSPEED = 13.0  # m/s, Table 1
@@ -27,7 +29,11 @@ SOME_PERIODS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 
 
 class EndedEarlyError(Exception):
-    """A flight ended before its time: on the ground, departed."""
+    """A flight ended before its time: on the ground, departed. That is a result."""
+
+
+class FlightFailedError(Exception):
+    """A flight has no result: its numbers are not finite, or its law raised an error."""
 
 
 class Column(NamedTuple):
@@ -59,17 +65,16 @@ class Column(NamedTuple):
         """That flight here, its command held as long as it says. Raises `EndedEarlyError`."""
         trace = flown(self.real(one))
         if trace.ended:
-            raise early(one, trace.ended)
+            raise early(one, trace.ended, trace.failed)
         return trace if self.scale == 1.0 else _in_papers_size(trace, self.change(one), self.scale)
 
-    def measured(self, one: Flight) -> dict[str, float | None]:
+    def measured(self, one: Flight) -> Mapping[str, float | None]:
         """The metrics of that flight here, airspeeds in the paper's size. Raises `EndedEarlyError`."""
-        log = simulate(self.real(self.held(one)))
-        if log.outcome is not Outcome.COMPLETED:
-            raise early(one, ending(log))
-        found = measure(log)
-        off = found["airspeed_deviation_rms_mps"]
-        return {**found, "airspeed_deviation_rms_mps": None if off is None else off / self.scale}
+        values, ended, failed = _measured(self.real(self.held(one)))
+        if ended:
+            raise early(one, ended, failed)
+        off = values["airspeed_deviation_rms_mps"]
+        return {**values, "airspeed_deviation_rms_mps": None if off is None else off / self.scale}
 
     def fly(self, one: Flight) -> Trace:
         """That flight here. Raises `EndedEarlyError`."""
@@ -90,9 +95,17 @@ class Column(NamedTuple):
         return f"{self.limit:.3g} deg/s"
 
 
-def early(one: Flight, how: str) -> EndedEarlyError:
+@lru_cache(maxsize=4)
+def _measured(one: Flight) -> tuple[Mapping[str, float | None], str, bool]:
+    """The metrics of a flight, how it ended where it did before its time, and whether it failed: asked for twice."""
+    log = simulate(one)
+    return measure(log), ending(log), log.outcome.failed
+
+
+def early(one: Flight, how: str, failed: bool) -> Exception:
     """What to raise when this flight ended so."""
-    return EndedEarlyError(f"the flight of {label(one.law)} over {one.duration:g} s ended: {how}")
+    kind = FlightFailedError if failed else EndedEarlyError
+    return kind(f"the flight of {label(one.law)} over {one.duration:g} s ended: {how}")
 
 
 def label(law: Law) -> str:
@@ -185,20 +198,37 @@ def _circling(airspeed: float) -> float:
     return math.degrees(bank_of_turn(airspeed, PAPERS_AIRSPEED / 60.0))
 
 
-BASELINE = Aircraft("kinematic", PAPERS_AIRSPEED, math.radians(43.0))
-AIRFRAMES = (
-    Aircraft("ultra_stick_25e", PAPERS_AIRSPEED, math.radians(43.0)),
-    Aircraft("skywalker_x8", PAPERS_AIRSPEED, math.radians(43.0)),
-    Aircraft("aerosonde", 25.0, math.radians(22.5)),
+_STEEP_BANK = math.radians(45.0)
+
+
+def _aircraft(name: str, airspeed: float) -> Aircraft:
+    return Aircraft(name, airspeed, float(rate_of_turn(np.array(airspeed), np.array(_STEEP_BANK))))
+
+
+BASELINE = _aircraft("kinematic", PAPERS_AIRSPEED)
+AIRFRAMES = tuple(  # the slowest first
+    sorted(
+        (_aircraft(name, aircraft.limits(aircraft.folder(name)).design_airspeed) for name in aircraft.names()),
+        key=lambda each: each.airspeed,
+    )
 )
+
+
+def _for_each_airspeed(value: Callable[[Aircraft], float], unit: str) -> str:
+    """A value at each airspeed flown, in words."""
+    by_airspeed = {each.airspeed: value(each) for each in (BASELINE, *AIRFRAMES)}
+    return ", ".join(f"{value:.3g}{unit} at {airspeed:g} m/s" for airspeed, value in by_airspeed.items())
+
+
 CONDITIONS = {
     "still air": "the paper's experiments as they are; the law knows the target as in the experiment's reading",
     "wind": "a steady 2 m/s of 13 towards north; an experiment with a wind of its own keeps it",
     "turbulence": "moderate, MIL-F-8785C, not made similar: the same air for all; seed 0, one draw",
     "EKF": "still air, the law seeing the target through the EKF with the paper's noise, not made similar; seed 0",
-    "45° of bank": "limits of 5 and 10 deg/s raised to a coordinated turn at 45°: 43 deg/s at 13 m/s, 22.5 at 25",
+    "45° of bank": "limits of 5 and 10 deg/s raised to a coordinated turn at 45°: "
+    + _for_each_airspeed(lambda each: math.degrees(each.steep), " deg/s"),
     "45° at 60 m": "the same on a circle of 60 m, which takes a bank to hold too, round a target at rest "
-    f"{_circling(PAPERS_AIRSPEED):.0f}° at 13 m/s and {_circling(25.0):.0f}° at 25 m/s",
+    + _for_each_airspeed(lambda each: _circling(each.airspeed), "°"),
 }
 
 
@@ -214,15 +244,15 @@ def _change(condition: str, limit: float) -> Callable[[Flight], Flight]:
     return changes[condition]
 
 
-def column(condition: str, aircraft: Aircraft) -> Column:
+def column(condition: str, flown_on: Aircraft) -> Column:
     """An aircraft in a condition."""
     return Column(
-        f"{condition}, {aircraft.name}",
+        f"{condition}, {flown_on.name}",
         CONDITIONS[condition],
-        _change(condition, aircraft.steep),
+        _change(condition, flown_on.steep),
         1.0,
-        aircraft="" if aircraft == BASELINE else aircraft.name,
-        scale=aircraft.airspeed / PAPERS_AIRSPEED,
+        aircraft="" if flown_on == BASELINE else flown_on.name,
+        scale=flown_on.airspeed / PAPERS_AIRSPEED,
         period=HELD,
         periods=SOME_PERIODS,
     )

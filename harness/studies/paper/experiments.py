@@ -62,7 +62,7 @@ class Reading:
         return f"{air}, a command held for {1000.0 * self.period:g} ms, the law {KNOWN[self.known]}"
 
 
-class Experiment(NamedTuple):
+class PaperExperiment(NamedTuple):
     """One of Section 4's simulations."""
 
     title: str
@@ -90,16 +90,16 @@ MANOEUVRES = (  # Section 4.3
     Segment(from_=550.0, to=570.0, turn_rate=math.radians(20.0 / 20.0)),
 )
 
-EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
+EXPERIMENTS: Mapping[str, PaperExperiment] = MappingProxyType(
     {
-        "30": Experiment("Stationary target, from 30 deg", 30.0, 80.0, 80.0, Target()),
-        "130": Experiment("Stationary target, from 130 deg", 130.0, 100.0, 100.0, Target()),
-        "S": Experiment(
+        "30": PaperExperiment("Stationary target, from 30 deg", 30.0, 80.0, 80.0, Target()),
+        "130": PaperExperiment("Stationary target, from 130 deg", 130.0, 100.0, 100.0, Target()),
+        "S": PaperExperiment(
             "Target in an S", 70.0, 2000.0, 330.0, replace(STRAIGHT, segments=S_SHAPE), Reading(period=0.005)
         ),
         # The acceleration unknown, the turn rate known: only so the SMC law is sensitive to the target's speed and
         # insensitive to its turns, as the text says. The limit: "only executed by NFTSM_1", says the text.
-        "manoeuvres": Experiment(
+        "manoeuvres": PaperExperiment(
             "Manoeuvring target",
             30.0,
             900.0,
@@ -155,6 +155,7 @@ class Trace:
     flight: Flight
     columns: Mapping[str, NDArray[np.float64]]
     ended: str = ""  # how and when, where it ended before its time
+    failed: bool = False  # it ended without a result
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         return self.columns[column]
@@ -164,10 +165,11 @@ class Trace:
 def flown(flight: Flight) -> Trace:
     """A flight, flown; the latest are kept, since much is asked of the same."""
     log = simulate(flight)
-    early = "" if log.outcome is Outcome.COMPLETED else ending(log)
-    return Trace(flight, {column: log[column].copy() for column in KEPT}, early)
+    return Trace(flight, {column: log[column].copy() for column in KEPT}, ending(log), log.outcome.failed)
 
 
 def ending(log: FlightLog) -> str:
-    """How and when a flight ended before its time."""
+    """How and when a flight ended before its time; empty when it did not."""
+    if log.outcome is Outcome.COMPLETED:
+        return ""
     return f"{log.outcome} after {log['time'][-1] if len(log) else 0.0:.1f} s ({log.reason})"

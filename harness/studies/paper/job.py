@@ -1,36 +1,36 @@
 """All that `harness reproduce` computes, in parts that any number of processes may share."""
 
-import multiprocessing
 import os
-import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
+from harness.pool import computed
 from harness.studies.paper.claims import CLAIMS
 from harness.studies.paper.columns import COLUMNS, GRID, Column
+from harness.studies.paper.decision import Decision
 from harness.studies.paper.experiments import EXPERIMENTS, flight, flown
 from harness.studies.paper.figures import LAWS_DRAWN, Sketch, sketch
-from harness.studies.paper.ledger import Finding, Findings, Flown, decided
+from harness.studies.paper.ledger import Decisions, FlownClaim, decided
 from harness.studies.paper.reproduce import Number, Reproduced, by_flight, in_order, reproduced
 
 Sketches = Mapping[tuple[str, str], Sketch]  # by experiment and law
 
 
-class Part(NamedTuple):
+class Reproduction(NamedTuple):
     """Some of what is computed, or all of it."""
 
     numbers: list[Reproduced]
     sketches: Sketches
-    findings: Findings
+    decisions: Decisions
 
 
-Job = Callable[[], Part]
+Job = Callable[[], Reproduction]
 
 
 def jobs(*, airframes: bool) -> list[Job]:
     """What there is to compute, the longest first; with the airframes if they are asked for."""
-    flown = [title for title, claims in CLAIMS.items() if any(isinstance(claim, Flown) for claim in claims)]
+    flown = [title for title, claims in CLAIMS.items() if any(isinstance(claim, FlownClaim) for claim in claims)]
     sections = sorted(flown, key=lambda title: title.startswith("4"), reverse=True)
     return [
         *(partial(_numbers, numbers) for numbers in reversed(by_flight())),
@@ -41,12 +41,12 @@ def jobs(*, airframes: bool) -> list[Job]:
     ]
 
 
-def _numbers(numbers: tuple[Number, ...]) -> Part:
-    return Part(reproduced(numbers), {}, {})
+def _numbers(numbers: tuple[Number, ...]) -> Reproduction:
+    return Reproduction(reproduced(numbers), {}, {})
 
 
-def _sketched(experiment: str, law: str) -> Part:
-    return Part([], {(experiment, law): sketch(flown(flight(experiment, law)))}, {})
+def _sketched(experiment: str, law: str) -> Reproduction:
+    return Reproduction([], {(experiment, law): sketch(flown(flight(experiment, law)))}, {})
 
 
 def flown_claims(title: str, column: Column) -> Job:
@@ -54,42 +54,26 @@ def flown_claims(title: str, column: Column) -> Job:
     return partial(_decided, title, column)
 
 
-def _decided(title: str, column: Column) -> Part:
-    return Part([], {}, decided(CLAIMS[title], column))
+def _decided(title: str, column: Column) -> Reproduction:
+    return Reproduction([], {}, decided(CLAIMS[title], column))
 
 
-def theory() -> Part:
+def theory() -> Reproduction:
     """What formulas decide."""
-    return Part([], {}, decided([claim for claims in CLAIMS.values() for claim in claims], None))
+    return Reproduction([], {}, decided([claim for claims in CLAIMS.values() for claim in claims], None))
 
 
-def everything(todo: list[Job], workers: int, done: Callable[[], None] = lambda: None) -> Part:
+def everything(todo: list[Job], workers: int, done: Callable[[], None] = lambda: None) -> Reproduction:
     """The parts of these jobs together, the same for any number of workers; `done` is called after each."""
     numbers: list[Reproduced] = []
     sketches: dict[tuple[str, str], Sketch] = {}
-    findings: dict[tuple[str, str], Finding] = {}
+    decisions: dict[tuple[str, str], Decision] = {}
     for part in computed(todo, workers):
         numbers += part.numbers
         sketches.update(part.sketches)
-        findings.update(part.findings)
+        decisions.update(part.decisions)
         done()
-    return Part(in_order(numbers), sketches, findings)
-
-
-def computed(todo: list[Job], workers: int) -> Iterator[Part]:
-    """The parts of these jobs, in any order."""
-    if workers == 1:
-        yield from (job() for job in todo)
-        return
-    heard = signal.signal(signal.SIGINT, signal.SIG_IGN)  # what the workers inherit: their parent ends them
-    pool = multiprocessing.get_context("spawn").Pool(workers)
-    signal.signal(signal.SIGINT, heard)
-    with pool:
-        yield from pool.imap_unordered(_done, todo)
-
-
-def _done(job: Job) -> Part:
-    return job()
+    return Reproduction(in_order(numbers), sketches, decisions)
 
 
 def workers() -> int:

@@ -11,6 +11,7 @@ from harness.studies.paper.experiments import Trace
 Array = NDArray[np.float64]
 
 CONVERGED = 1e-4  # m, Table 3
+ON_THE_CIRCLE = 1.0  # m: the "desired distance error range", on any aircraft
 SETTLED_FOR = 1.0  # s that must be left: less tells nothing of "for good"
 
 

@@ -8,16 +8,17 @@ from harness.studies.paper.claims import CLAIMS
 from harness.studies.paper.columns import COLUMNS, CONDITIONS
 from harness.studies.paper.experiments import EXPERIMENTS
 from harness.studies.paper.figures import LAWS_DRAWN, Sketch
-from harness.studies.paper.job import Part, Sketches
-from harness.studies.paper.ledger import Verdict, cells, counts
+from harness.studies.paper.job import Reproduction, Sketches
+from harness.studies.paper.ledger import cells, counts
 from harness.studies.paper.reproduce import VARIANTS, VARIANTS_TOLD, shown
 from harness.template import template
+from harness.vocabulary import Verdict
 
 _R, _S = ("r", "r [m]", None), ("s", "s [rad]", None)
 _RATE, _HEADING = ("rate", "ω_ψ [deg/s]", None), ("heading", "ψ_a [deg]", None)
 
 
-def page(everything: Part) -> str:
+def page(everything: Reproduction) -> str:
     """The HTML page."""
     return template("harness.studies.paper", "page.html.jinja").render(
         results=everything.numbers,
@@ -29,11 +30,11 @@ def page(everything: Part) -> str:
         figures=_figures(everything.sketches),
         claims=CLAIMS,
         columns=COLUMNS,
-        cells=partial(cells, findings=everything.findings),
-        counts=counts(everything.findings),
-        airframes=airframes if airframes.have_flown(everything.findings) else None,
-        numbers_on_airframes=partial(airframes.numbers, everything.findings),
-        summary=partial(airframes.summary, findings=everything.findings),
+        cells=partial(cells, decisions=everything.decisions),
+        counts=counts(everything.decisions),
+        airframes=airframes if airframes.have_flown(everything.decisions) else None,
+        numbers_on_airframes=partial(airframes.counts_by_condition, everything.decisions),
+        summary=partial(airframes.summary, decisions=everything.decisions),
         conditions=CONDITIONS,
         verdicts=list(Verdict),
     )
