@@ -47,10 +47,16 @@ def compare(
     else:
         flights, margins = flights_and_margins(Path(results))
         question = str(last_run(Path(results))["question"] or "")
+    return compare_chosen(flights, assess or margins, by, baseline, where or {}, question)
+
+
+def compare_chosen(
+    flights: pd.DataFrame, assess: Assess, by: str, baseline: object, where: Mapping[str, object], question: str
+) -> Comparison:
+    """The flights with these settings compared. Raises `CompareError` with what is missing or unknown."""
     if by not in settings_of(flights):
         raise CompareError(_unknown("by", by, settings_of(flights)))
-    chosen = _chosen(flights, where or {})
-    return compare_flights(chosen, assess or margins, by, baseline, question)
+    return compare_flights(_chosen(flights, where), assess, by, baseline, question)
 
 
 def flights_and_margins(folder: Path, overrides: Sequence[str] = ()) -> tuple[pd.DataFrame, Assess]:

@@ -12,12 +12,17 @@ if TYPE_CHECKING:
     from harness.verdict.report import Origin
 
 
-def read_comparison(folder: Path, baseline: str, overrides: tuple[str, ...]) -> tuple[Comparison, Origin]:
+def read_comparison(
+    folder: Path,
+    overrides: tuple[str, ...] = (),
+    by: str = "plant",
+    baseline: str | None = None,
+    where: tuple[str, ...] = (),
+) -> tuple[Comparison, Origin]:
     """The comparison of a run's directory. BadInput when it holds none, with what is missing."""
-    from harness.comparison import flights_and_margins
+    from harness.comparison import compare_chosen, flights_and_margins
     from harness.error import SettingsError
     from harness.runs.store import StoreError, last_run
-    from harness.verdict.comparison import compare_flights
     from harness.verdict.pairs import CompareError
     from harness.verdict.report import origin_of
 
@@ -27,10 +32,39 @@ def read_comparison(folder: Path, baseline: str, overrides: tuple[str, ...]) -> 
     try:
         flights, assess = flights_and_margins(folder, overrides)
         run = last_run(folder)
-        comparison = compare_flights(flights, assess, baseline=baseline, question=str(run["question"] or ""))
+        question = str(run["question"] or "")
+        comparison = compare_chosen(flights, assess, by, _value(baseline), _chosen(where), question)
         return comparison, origin_of(str(folder), run)
     except SettingsError as error:
         raise BadInput(str(error)) from None
     except (StoreError, CompareError) as error:
         text = str(error)
         raise BadInput(text if text.startswith(str(folder)) else f"{folder}: {text}") from None
+
+
+def _chosen(where: tuple[str, ...]) -> dict[str, object]:
+    """KEY=VALUE texts as settings; a key that is given twice keeps all its values."""
+    chosen: dict[str, object] = {}
+    for text in where:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise BadInput(f"--where {text}: must be KEY=VALUE, as in aircraft=aerosonde")
+        known = chosen.get(key.strip())
+        values = [*(known if isinstance(known, list) else []), _value(value)]
+        chosen[key.strip()] = values
+    return chosen
+
+
+def _value(text: str | None) -> object:
+    """A value as a settings file would have it: a number, a list or a word; None for none."""
+    import tomllib
+
+    if text is None:
+        return None
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+    if isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    return tuple(value) if isinstance(value, list) else value

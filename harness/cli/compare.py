@@ -7,22 +7,32 @@ import click
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--baseline", default="kinematic", show_default=True, help="The plant that the others are compared with.")
+@click.option("--by", default="plant", show_default=True, metavar="KEY", help="The setting whose values are compared.")
+@click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
+@click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
 @click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
 @click.option("--json", "form", flag_value="json", help="Print everything as one JSON object.")
 @click.option("--csv", "form", flag_value="csv", help="Print the paired differences as CSV.")
 @click.option("--latex", "form", flag_value="latex", help="Print the paired differences as a LaTeX tabular.")
-def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: str | None) -> None:
-    """Compare the flights of a run that differ in the plant alone.
+def compare(
+    directory: Path,
+    by: str,
+    baseline: str | None,
+    where: tuple[str, ...],
+    overrides: tuple[str, ...],
+    form: str | None,
+) -> None:
+    """Compare the flights of a run that differ in one setting alone.
 
-    DIR is a folder that `harness run` wrote. Prints the paired differences with 95 % intervals, and whether each part
-    of the coordinated-flight assumption holds within its margin: the table [assess] of the experiment's file, see
-    `harness list margins`.
+    DIR is a folder that `harness run` wrote; the setting is the plant unless --by names another. Prints for each
+    airframe which part of the coordinated-flight assumption holds within its margin, or which metrics differ, with
+    95 % intervals. The margins are the table [assess] of the experiment's file, see `harness list margins`.
 
     \b
     Examples:
       harness compare out/wind
       harness compare out/wind --json --set assess.range_error_margin_m=1
+      harness compare out/laws --by law.name --baseline smc --where plant=sixdof
     """
     import json
 
@@ -32,7 +42,7 @@ def compare(directory: Path, baseline: str, overrides: tuple[str, ...], form: st
     from harness.verdict.text import lines
 
     with busy("comparing"):
-        comparison, _ = read_comparison(directory, baseline, overrides)
+        comparison, _ = read_comparison(directory, overrides, by, baseline, where)
     match form:
         case "json":
             click.echo(json.dumps(as_document(comparison), allow_nan=False))

@@ -33,7 +33,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
         "Many flights": {
             "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
-            "compare": Entry("compare:compare", "Compare the flights of a run that differ in the plant alone."),
+            "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },
         "The paper": {

@@ -9,9 +9,19 @@ import click
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="The HTML file. [default: DIR/report.html]")
 @click.option("--markdown", type=click.Path(path_type=Path), help="Write this Markdown file instead, without figures.")
-@click.option("--baseline", default="kinematic", show_default=True, help="The plant that the others are compared with.")
+@click.option("--by", default="plant", show_default=True, metavar="KEY", help="The setting whose values are compared.")
+@click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
+@click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
 @click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
-def report(directory: Path, out: Path | None, markdown: Path | None, baseline: str, overrides: tuple[str, ...]) -> None:
+def report(
+    directory: Path,
+    out: Path | None,
+    markdown: Path | None,
+    by: str,
+    baseline: str | None,
+    where: tuple[str, ...],
+    overrides: tuple[str, ...],
+) -> None:
     """Write the comparison as one HTML page with figures.
 
     The page says what `harness compare DIR` prints, fetches nothing, and suits a browser and paper. Prints the name
@@ -35,7 +45,7 @@ def report(directory: Path, out: Path | None, markdown: Path | None, baseline: s
         raise BadInput(f"{directory}: there is no such folder")
     path = writable(markdown or out or directory / "report.html")
     with busy("comparing and drawing"):
-        comparison, origin = read_comparison(directory, baseline, overrides)
+        comparison, origin = read_comparison(directory, overrides, by, baseline, where)
         text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
         with replacing(path) as partial:
             partial.write_text(text, encoding="utf-8")

@@ -11,6 +11,22 @@ from harness.settings.table import schema_of
 _LISTS_OF_TABLES = ("segments", "gusts")
 
 
+def nested(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """The inverse of `by_column`: a [flight] table of settings by their dotted keys."""
+    table: dict[str, Any] = {}
+    for key, value in columns.items():
+        *within, last = key.split(".")
+        inner = table
+        for name in within:
+            inner = inner.setdefault(name, {})
+        if last in _LISTS_OF_TABLES and isinstance(value, str):
+            value = json.loads(value)
+        elif isinstance(value, float) and math.isinf(value):
+            value = "inf"
+        inner[last] = list(value) if isinstance(value, tuple) else value
+    return table
+
+
 def is_setting(column: str) -> bool:
     """Whether a column of results is a setting: a key, or below a table, of [flight]. Everything else is a result."""
     return column.partition(".")[0] in schema_of(Flight).settings
