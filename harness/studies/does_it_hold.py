@@ -1,0 +1,308 @@
+"""Does coordinated flight hold? `python -m harness.studies.does_it_hold RUN` writes does_it_hold.md.
+
+RUN is the directory of `experiments/assumption.toml` (`make verdict`). Every statement names its condition, its numbers
+and its n, and the command that repeats it.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from harness.comparison import flights_and_margins
+from harness.files import replacing
+from harness.margins import Assess
+from harness.studies.command import out_option, run, write
+from harness.template import template
+from harness.verdict.answer import counted, interval, plain, signed, unit_of
+from harness.verdict.comparison import Comparison, Scorecard, compare_flights
+from harness.verdict.conditions import conclude
+from harness.verdict.effects import Disturbed, disturbances
+from harness.verdict.following import with_following
+from harness.verdict.judgement import Judgement
+from harness.verdict.pairs import entered
+from harness.verdict.parts import PARTS, Group, with_shares
+from harness.vocabulary import SIGNS, Verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PLANTS = ("kinematic", "sixdof")
+PAPERS_LIMIT = 5.0  # deg/s
+MAIN_LAW = "nftsm fitted"  # the paper's law with the gains that give its Table 3
+QUIET = (
+    "--where wind.turbulence=none --where 'wind.steady_mps=[0.0, 0.0]' --where estimator.kind=truth "
+    "--where guidance_period_s=0.05 --where law.airspeed=nominal"
+)
+
+
+class Statement(NamedTuple):
+    """A sentence, and the options of `harness compare RUN` that repeat it."""
+
+    text: str
+    options: str
+
+
+class Cell(NamedTuple):
+    """A part on an airframe at a limit and on a circle: the word over all laws, and the worst of them."""
+
+    word: Verdict
+    worst: Judgement
+
+    @property
+    def text(self) -> str:
+        return f"{SIGNS[self.word]} {plain(abs(self.worst.difference))}"
+
+
+def core(flights: "pd.DataFrame") -> "pd.DataFrame":
+    """The undisturbed flights: still air, the target known, the shortest guidance period, the nominal airspeed."""
+    still = flights["wind.steady_mps"].map(lambda wind: not any(wind))
+    return flights[
+        still
+        & (flights["wind.turbulence"] == "none")
+        & (flights["estimator.kind"] == "truth")
+        & (flights["guidance_period_s"] == flights["guidance_period_s"].min())
+        & (flights["law.airspeed"] == "nominal")
+    ].reset_index(drop=True)
+
+
+def compared(flights: "pd.DataFrame", assess: Assess) -> Comparison:
+    """The 6-DOF flights beside the kinematic ones."""
+    return compare_flights(flights[flights["plant"].isin(PLANTS)].reset_index(drop=True), assess)
+
+
+def still_air(comparison: Comparison) -> Iterator[Statement]:
+    """At the paper's limit, on the paper's circle: whether each law converges, when, and whether it cycles."""
+    table = comparison.table
+    for card in comparison.scorecards:
+        for law in _laws(card):
+            cell = _at(card, law, PAPERS_LIMIT)
+            if cell is None:
+                continue
+            flown = table[_mask(table, card.aircraft, law, PAPERS_LIMIT)]
+            shares = [
+                f"{int(rows['converged'].sum())} of {len(rows)} on {plant}"
+                for plant in PLANTS
+                if len(rows := flown[flown["plant"] == plant])
+            ]
+            clauses = [f"converges in {' and '.join(shares)}"]
+            clauses += [
+                clause
+                for column in ("convergence_time_s", "range_error_rms_m")
+                for clause in _clause(card, column, cell)
+            ]
+            clauses.append(_cycle(flown[flown["plant"] == PLANTS[1]]))
+            options = f"{QUIET} --where aircraft={card.aircraft} --where law.max_heading_rate_deg_s={PAPERS_LIMIT:g}"
+            yield Statement(f"{card.aircraft}, {law}: {'; '.join(clauses)}.", options)
+
+
+def _clause(card: Scorecard, column: str, at: dict[str, object]) -> Iterator[str]:
+    names = {"convergence_time_s": "later by", "range_error_rms_m": "settled error"}
+    for judgement in card.of(column):
+        if dict(judgement.at) == at and judgement.pairs:
+            n = f"n = {judgement.pairs}"
+            yield f"{names[column]} {number(judgement)} ({n})"
+
+
+def _cycle(flown: "pd.DataFrame") -> str:
+    known = flown["chatters"].dropna()
+    cycling = flown[flown["chatters"] == 1.0]
+    if not len(known):
+        return "whether it is in a limit cycle is not known"
+    text = f"in a limit cycle in {len(cycling)} of {len(known)} flights"
+    if len(cycling):
+        hertz, swing = cycling["limit_cycle_hz"].median(), cycling["limit_cycle_amplitude_deg_s"].median()
+        text += f" ({hertz:.2g} Hz, ±{swing:.2g} deg/s)"
+    return text
+
+
+class Followed(NamedTuple):
+    """How a law's commands are followed at the paper's limit: predicted from the inner loop, and observed in flight."""
+
+    aircraft: str
+    law: str
+    gain: float  # at low frequency
+    delay: float  # s, at the law's crossover
+    margin: float  # to the limit cycle
+    predicted_hz: float
+    predicted_swing: float  # deg/s
+    cycling: int
+    of: int
+    observed_hz: float
+    observed_swing: float  # deg/s
+
+
+def followed(comparison: Comparison) -> Iterator[Followed]:
+    """Of every airframe and law."""
+    table = comparison.table
+    for card in comparison.scorecards:
+        for law in _laws(card):
+            rows = table[_mask(table, card.aircraft, law, PAPERS_LIMIT) & (table["plant"] == PLANTS[1])]
+            if not len(rows):
+                continue
+            cycling = rows[rows["chatters"] == 1.0]
+            first = rows.iloc[0]
+            yield Followed(
+                card.aircraft, law, float(first["heading_rate_gain_slow"]), float(first["heading_rate_delay_s"]),
+                float(first["limit_cycle_margin"]), float(first["predicted_cycle_hz"]),
+                float(first["predicted_cycle_amplitude_deg_s"]), len(cycling), int(rows["chatters"].notna().sum()),
+                float(cycling["limit_cycle_hz"].median()) if len(cycling) else math.nan,
+                float(cycling["limit_cycle_amplitude_deg_s"].median()) if len(cycling) else math.nan,
+            )  # fmt: skip
+
+
+class Matrix(NamedTuple):
+    """Parts by airframe and condition."""
+
+    columns: list[tuple[str, float, float]]  # airframe, limit deg/s, radius m
+    rows: list[tuple[str, str, list[Cell | None]]]  # part, unit, cells
+
+
+def matrix(comparison: Comparison) -> Matrix:
+    """The parts of coordinated flight, over all laws, at each limit and on each circle."""
+    columns = [
+        (card.aircraft, limit, radius)
+        for card in comparison.scorecards
+        for limit, radius in sorted({_circle(judgement) for judgement in card.judgements}, key=lambda c: (c[0], -c[1]))
+    ]
+    rows = []
+    for part in PARTS.values():
+        if part.group is Group.COORDINATED:
+            cells = [_cell(comparison, part.column, *column) for column in columns]
+            if any(cells):
+                rows.append((part.title, part.unit, cells))
+    return Matrix(columns, rows)
+
+
+def _cell(comparison: Comparison, column: str, aircraft: str, limit: float, radius: float) -> Cell | None:
+    card = next(card for card in comparison.scorecards if card.aircraft == aircraft)
+    judgements = [judgement for judgement in card.of(column) if _circle(judgement) == (limit, radius)]
+    if not judgements:
+        return None
+    worst = max(judgements, key=lambda judgement: (judgement.word == Verdict.FAILS, judgement.use))
+    return Cell(conclude(judgements, {}).word, worst)
+
+
+def _circle(judgement: Judgement) -> tuple[float, float]:
+    at = judgement.at
+    return _number(at, "law.max_heading_rate_deg_s"), _number(at, "law.standoff_m")
+
+
+def _number(at: object, key: str) -> float:
+    value = at.get(key) if isinstance(at, dict) else None
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def disturbed(flights: "pd.DataFrame", assess: Assess) -> list[Disturbed]:
+    """What each disturbance alone adds at the paper's limit, with the paper's law."""
+    table = with_shares(entered(flights[flights["plant"].isin(PLANTS)].reset_index(drop=True), assess.circling_error))
+    law = (table["law.name"] + " " + table["law.gains"]) == MAIN_LAW
+    limited = table["law.max_heading_rate_deg_s"] == PAPERS_LIMIT
+    return list(disturbances(table[law & limited].reset_index(drop=True), PLANTS))
+
+
+def _laws(card: Scorecard) -> list[str]:
+    return list(dict.fromkeys(str(judgement.at["law"]) for judgement in card.judgements if "law" in judgement.at))
+
+
+def _at(card: Scorecard, law: str, limit: float) -> dict[str, object] | None:
+    """The cell of this law at this limit, on the widest circle."""
+    there = [
+        dict(judgement.at)
+        for judgement in card.judgements
+        if judgement.at.get("law") == law and _circle(judgement)[0] == limit
+    ]
+    return max(there, key=lambda at: _number(at, "law.standoff_m"), default=None)
+
+
+def _mask(table: "pd.DataFrame", aircraft: str, law: str, limit: float) -> "pd.Series[bool]":
+    named = (table["law.name"] + " " + table["law.gains"]) == law
+    chosen: pd.Series[bool] = (table["aircraft"] == aircraft) & named & (table["law.max_heading_rate_deg_s"] == limit)
+    return chosen
+
+
+def number(judgement: Judgement) -> str:
+    """A difference with its interval and unit."""
+    unit = unit_of(judgement.column)
+    return f"{signed(judgement.difference)}{interval(judgement.low, judgement.high)} {unit}".strip()
+
+
+def short_answer(comparison: Comparison) -> Iterator[str]:
+    """The head of the page and of the README: a sentence for each thing that is asked."""
+    at_limit = matrix(comparison)
+    for aircraft in dict.fromkeys(column[0] for column in at_limit.columns):
+        i = next(i for i, column in enumerate(at_limit.columns) if column[:2] == (aircraft, PAPERS_LIMIT))
+        clauses = [
+            f"{title} {cells[i].word} ({plain(abs(cells[i].worst.difference))} {unit})"
+            for title, unit, cells in at_limit.rows
+            if cells[i] is not None
+        ]
+        n = next(card.seeds for card in comparison.scorecards if card.aircraft == aircraft)
+        yield f"{aircraft}: {', '.join(clauses)}; worst of all laws, {counted(n, 'seed')} each."
+
+
+def page(flights: "pd.DataFrame", assess: Assess, folder: str) -> tuple[str, str]:
+    """The page, and README's block."""
+    quiet = core(flights)
+    comparison = compared(quiet, assess)
+    fields = {
+        "folder": folder,
+        "limit": PAPERS_LIMIT,
+        "law": MAIN_LAW,
+        "quiet": QUIET,
+        "short": list(short_answer(comparison)),
+        "still": list(still_air(comparison)),
+        "matrix": matrix(comparison),
+        "followed": list(followed(comparison)),
+        "disturbed": disturbed(flights, assess),
+        "plain": lambda x: "–" if x is None or math.isnan(x) else plain(x),
+        "signed": signed,
+        "interval": interval,
+        "assess": assess,
+        "degrees": math.degrees,
+        "signs": SIGNS,
+    }
+    texts = [template("harness.studies", name).render(fields) for name in ("does_it_hold.md.jinja", "answer.md.jinja")]
+    return texts[0] + "\n", texts[1].strip() + "\n"
+
+
+def in_readme(readme: str, block: str) -> str:
+    """README with its answer replaced."""
+    return re.sub(
+        r"(<!-- answer -->\n).*?(<!-- /answer -->)", lambda m: f"{m[1]}{block}{m[2]}", readme, flags=re.DOTALL
+    )
+
+
+def rows_kept(quiet: "pd.DataFrame") -> "pd.DataFrame":
+    """The undisturbed rows of both plants, without what the sentences do not need: the committed file of the tests."""
+    kept = quiet[quiet["plant"].isin(PLANTS)].drop(columns=["run", "version", "seconds"], errors="ignore")
+    constant = [c for c in kept.columns if c.startswith(("estimator.", "target.", "wind.", "inner_loop.", "metrics."))]
+    needed = ("wind.steady_mps", "wind.turbulence", "estimator.kind")
+    return with_following(kept.drop(columns=[c for c in constant if c not in needed])).reset_index(drop=True)
+
+
+@click.command()
+@click.argument("directory", metavar="RUN", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.option("--readme", type=click.Path(path_type=Path, dir_okay=False), help="Write the answer here too.")
+@click.option("--rows", type=click.Path(path_type=Path, dir_okay=False), help="Keep the undisturbed rows here.")
+@out_option
+def main(directory: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
+    """Write OUT/does_it_hold.md from the flights of RUN, the directory of experiments/assumption.toml."""
+    flights, assess = flights_and_margins(directory)
+    text, block = page(flights, assess, str(directory))
+    write(out, {"does_it_hold.md": text})
+    if readme is not None:
+        with replacing(readme) as partial:
+            partial.write_text(in_readme(readme.read_text(encoding="utf-8"), block), encoding="utf-8")
+        click.echo(readme)
+    if rows is not None:
+        with replacing(rows) as partial:
+            rows_kept(core(flights)).to_parquet(partial, index=False)
+        click.echo(rows)
+
+
+if __name__ == "__main__":
+    run(main, "harness.studies.does_it_hold")
