@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
+from harness.chatter import Oscillation, oscillation
 from harness.feasibility import feasibility_margin
 from harness.log import FlightLog
 from harness.plants.ladder import PLANTS
@@ -98,6 +99,17 @@ class Signals:
     def circling(self, column: str) -> Array:
         """The rows of a column over which circling is judged: see `window`."""
         return self.log[column][self.window.first :]
+
+    @cached_property
+    def oscillation(self) -> Oscillation | None:
+        """The strongest oscillation while circling is judged; None when the record is too short to tell."""
+        first = self.window.first
+        return oscillation(self.held_command[first:], self.flown_rate[first:], self.period)
+
+    @property
+    def limit_cycle(self) -> Oscillation | None:
+        """The limit cycle while circling is judged; None when there is none, or none to be told."""
+        return self.oscillation if self.oscillation and self.oscillation.chatters else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -371,6 +383,34 @@ _METRICS = (
         heading="command activity",
         in_short_tables=True,
         of_circling=True,
+    ),
+    Metric(
+        name="chatters",
+        unit=YES_OR_NO,
+        meaning="whether law and aircraft are in a limit cycle while circling is judged; null when gusts may hide one",
+        measure=lambda signals: signals.oscillation.chatters if signals.oscillation else None,
+        heading="limit cycle",
+        of_circling=True,
+        compared=False,
+    ),
+    Metric(
+        name="limit_cycle_hz",
+        unit="Hz",
+        meaning="frequency of that limit cycle",
+        measure=lambda signals: signals.limit_cycle.frequency if signals.limit_cycle else None,
+        heading="limit cycle",
+        of_circling=True,
+        compared=False,
+    ),
+    Metric(
+        name="limit_cycle_amplitude_deg_s",
+        unit="deg/s",
+        meaning="half of peak to peak of the flown heading rate in that limit cycle",
+        measure=lambda signals: math.degrees(signals.limit_cycle.heading_rate) if signals.limit_cycle else None,
+        heading="limit cycle",
+        statistic="amplitude",
+        of_circling=True,
+        compared=False,
     ),
     Metric(
         name="heading_rate_error_rms_deg_s",

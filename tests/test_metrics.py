@@ -182,13 +182,14 @@ def test_turn_ratio_is_heading_rate_over_the_coordinated_one() -> None:
     assert measured({"bank": bank, "heading_rate": rate})["turn_ratio"] == pytest.approx(0.93)
 
 
-def test_what_a_plant_does_not_have_is_none() -> None:
+def test_what_a_plant_or_a_flight_does_not_have_is_none() -> None:
     judged = measured({})
     assert set(judged) == set(METRICS)
     missing = {name for name, value in judged.items() if value is None}
     assert missing == {
         "overshoot_m", "heading_rate_lag_s", "heading_rate_gain", "turn_ratio", "sideslip_rms_deg", "sideslip_peak_deg",
-        "bank_peak_deg", "bank_reserve_deg", "lateral_acceleration_rms_mps2",
+        "bank_peak_deg", "bank_reserve_deg", "lateral_acceleration_rms_mps2", "limit_cycle_hz",
+        "limit_cycle_amplitude_deg_s",
     }  # fmt: skip
 
 

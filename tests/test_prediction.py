@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from autopilot.guidance import Guidance, Observation
+from harness.chatter import VISIBLE
 from harness.identification.manoeuvres import STEP
 from harness.limit_cycle.observed import fly
-from harness.limit_cycle.prediction import VISIBLE, Loop, boundary, critical_gain, limit_cycle
+from harness.limit_cycle.prediction import Loop, boundary, critical_gain, limit_cycle
 from harness.plants.lagged import Lagged
 from harness.plants.response import plain
 from harness.plants.sixdof import SixDof
@@ -140,7 +141,13 @@ def test_a_quicker_response_is_the_same_in_scaled_time() -> None:
 def test_the_command_tells_the_cycle_and_what_would_end_it() -> None:
     result = invoke("predict", EXPERIMENT)
     assert result.exit_code == 0, result.output
-    for told in ("critical gain", "limit cycle: 0.6", "times as fast", "up to gains of k2 = 2.59,"):
+    for told in (
+        "critical gain",
+        "limit cycle: 0.6",
+        "times as fast",
+        "up to gains of k2 = 2.59,",
+        "limit cycle: 0.241 times",
+    ):
         assert told in result.output
     calm = invoke("predict", EXPERIMENT, "--set", "law.name=smc", "--set", "law.gains=paper")
     assert "no limit cycle" in calm.output

@@ -25,6 +25,7 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
     from autopilot.nftsm import Nftsm
     from harness.checks import airframe_of
     from harness.cli._input import BadInput, flight_of, read_file
+    from harness.limit_cycle.margin import ENOUGH, following
     from harness.limit_cycle.prediction import Loop, boundary, critical_gain, limit_cycle
     from harness.plants.identified import IdentifiedError, identified
 
@@ -53,6 +54,16 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
             f"command ±{math.degrees(cycle.command):.3g} deg/s, range error "
             f"{cycle.range_mean:.3g} ±{cycle.range_error:.3g} m"
         )
+    found = following(flight)
+    if found.crossover and found.crossover_gain and found.crossover_delay and found.phase_margin is not None:
+        click.echo(
+            f"crossover of law and inner loop: {found.crossover:.3g} rad/s, where the heading rate is "
+            f"{found.crossover_gain:.3g} of its command and {found.crossover_delay:.3g} s late "
+            f"({found.low_frequency_gain:.3g} of it at low frequency); phase margin "
+            f"{math.degrees(found.phase_margin):.0f} deg"
+        )
+    if found.margin is not None:
+        click.echo(f"margin to the limit cycle: {found.margin:.3g} times the law's gain ({ENOUGH:g} or more is asked)")
     if isinstance(law, Nftsm):
         quicker = boundary(lambda q: replace(loop, response=loop.response.quicker(q)), 4.0)
         gains = boundary(lambda q: replace(loop, law=replace(law, k2=q * law.k2, k3=q * law.k3)), 0.3)

@@ -25,7 +25,7 @@ from harness.identification.manoeuvres import (
     sweep,
 )
 from harness.plants.coordinated import bank_command
-from harness.plants.identified import Identified
+from harness.plants.identified import Identified, Sweep
 from harness.plants.plant import Plant, Start
 from harness.plants.state import State
 from harness.plants.turn import rate_of_turn
@@ -75,6 +75,12 @@ class FrequencyResponse:
             np.interp(math.log(omega), lines, phase)
         )
 
+    @property
+    def sweep(self) -> Sweep:
+        """The same as numbers to keep."""
+        phase = np.unwrap(np.angle(self.ratio))
+        return Sweep._make(tuple(values.tolist()) for values in (manoeuvres.lines(), np.abs(self.ratio), phase))
+
 
 @dataclass(frozen=True, slots=True)
 class Identification:
@@ -120,7 +126,7 @@ def identify(airframe: Path, airspeed: float, done: Callable[[], None] = lambda:
     change = airspeed_change(fitted.hold, entries[-1].input)
     return Identification(
         airframe=airframe,
-        identified=replace(fitted, measured=measured, errors=errors),
+        identified=replace(fitted, measured=measured, errors=errors, sweep=sweeps["small"].sweep),
         steps=steps,
         sweeps=sweeps,
         airspeed_error=(rms(change - entries[-1].output), rms(entries[-1].output)),

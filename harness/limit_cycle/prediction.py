@@ -11,6 +11,7 @@ biases the law, and a mean range error compensates the bias. With one harmonic t
 with more it converges to the cycle of the sampled loop. The law is called as in flight: no gain of it is approximated.
 """
 
+import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,13 +22,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from autopilot.guidance import Law, Observation
+from harness.chatter import VISIBLE
 from harness.plants.response import Response
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HARMONICS = 15
-VISIBLE = math.radians(0.5)  # rad/s: an oscillation of the command with a smaller amplitude is not a limit cycle
 _SAMPLES = 128  # in one cycle
 _SOLVED = 1e-6  # the largest imbalance of a solution, relative to the first harmonic
 _UNKNOWN = (math.nan, math.nan, math.nan)  # heading rate, bank, roll rate: unknown here
@@ -51,6 +52,7 @@ class Loop:
     response: Response  # of the heading rate to its command
     airspeed: float
     period: float  # s, between two commands
+    gain: float = 1.0  # times what the law commands beyond the turn of the circle: 2 is 6 dB more loop gain
 
     @property
     def turn(self) -> float:
@@ -66,7 +68,11 @@ class Loop:
         def command(e: float, r: float) -> float:
             psi = e - 0.5 * math.pi  # due north of the target, at the origin, the paper's circle goes west
             own = (R_d + r, 0.0, v_a * math.cos(psi), v_a * math.sin(psi), v_a, psi, *_UNKNOWN, v_a)
-            return float(step(Observation._make((*own, *(0.0,) * 8))).heading_rate)
+            guidance = step(Observation._make((*own, *(0.0,) * 8)))
+            if self.gain == 1.0:
+                return float(guidance.heading_rate)
+            wanted = self.turn + self.gain * (guidance.unlimited_command - self.turn)
+            return float(np.clip(wanted, -self.law.max_heading_rate, self.law.max_heading_rate))
 
         return np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)])
 
@@ -167,6 +173,37 @@ def critical_gain(response: Response, period: float) -> tuple[float, float]:
         (-1.0 / float(H.real[i + 1]), float(omega[i + 1])) for i in (*crossing, len(omega) - 2) if H.real[i + 1] < 0
     ]
     return min(gains, default=(math.inf, math.inf))
+
+
+class Crossover(NamedTuple):
+    """Where the loop of law and inner loop, opened at the command, neither amplifies nor weakens an oscillation."""
+
+    frequency: float  # rad/s
+    phase_margin: float  # rad: lag that the loop can still bear there; below zero when it oscillates by itself
+    gain: float  # 1/s, of the law there: command over heading error
+
+
+def crossover(loop: Loop) -> Crossover | None:
+    """The crossover for an oscillation by which the command swings by `VISIBLE`; None when there is none.
+
+    The law's gain depends on the size of the oscillation, so it is that of its first harmonic (describing function).
+    """
+    fastest = min(critical_gain(loop.response, loop.period)[1], 0.9 * math.pi / loop.period)
+
+    def imbalance(x: Array) -> Array:
+        cycle = _cycle(loop, x)
+        ratio = abs(complex(1.0 + cycle.imbalance[1], cycle.imbalance[2]))  # once round the loop, over what it was
+        swing = max(2.0 * abs(cycle.U[1]), 1e-300)
+        return np.array([cycle.imbalance[0], math.log(max(ratio, 1e-300)), math.log(swing / VISIBLE)])
+
+    for share in (1.0, 0.5, 0.2, 0.08, 0.03, 0.01):
+        omega = share * fastest
+        x = _solved(imbalance, np.array([math.log(omega), math.log(0.5 * VISIBLE / omega), 0.0]))
+        if x is not None:
+            cycle = _cycle(loop, x)
+            once_round = complex(1.0 + cycle.imbalance[1], cycle.imbalance[2])
+            return Crossover(cycle.omega, cmath.phase(once_round), abs(cycle.U[1]) / math.exp(x[1]))
+    return None
 
 
 def boundary(loop_at: Callable[[float], Loop], guess: float) -> float:

@@ -1,12 +1,15 @@
 """The identified inner loop of an airframe: the file `identified.toml`, for the plants `lagged` and `coordinated`."""
 
 import hashlib
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 import aircraft
 import autopilot
@@ -25,6 +28,21 @@ class IdentifiedError(PlantError):
         super().__init__("start.airspeed", message)
 
 
+class Sweep(NamedTuple):
+    """A flown sweep of small commands: flown over commanded heading rate, a value per frequency, slowest first."""
+
+    frequency: tuple[float, ...]  # rad/s
+    gain: tuple[float, ...]
+    phase: tuple[float, ...]  # rad, counted on beyond a whole turn; negative where the aircraft lags
+
+    def at(self, omega: float) -> tuple[float, float]:
+        """(gain, phase in rad) at a frequency in rad/s, between the flown ones; NaN beyond them."""
+        if not self.frequency[0] <= omega <= self.frequency[-1]:
+            return math.nan, math.nan
+        known, at = np.log(self.frequency), math.log(omega)
+        return float(np.interp(at, known, self.gain)), float(np.interp(at, known, self.phase))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identified:
     """Linear responses of an airframe under its inner loop at one airspeed. SI, rad."""
@@ -36,6 +54,7 @@ class Identified:
     bank_limit: float  # of the inner loop's command
     measured: Mapping[str, float]  # figures of the flown step and sweep, by name
     errors: Mapping[str, tuple[float, float]]  # by validation manoeuvre: (lagged, coordinated), RMS over the command's
+    sweep: Sweep | None = None  # of `manoeuvres.SWEPT["small"]`; None in a file of an earlier version
 
     @property
     def lagged(self) -> Lagged:
@@ -107,6 +126,14 @@ def document(airframe: Path, known: list[Identified]) -> str:
             "[at.errors] # of the heading rate, RMS over the command's, [lagged, coordinated]; not used in the fit"
         )
         lines += [f'"{name}" = [{a:.4f}, {b:.4f}]' for name, (a, b) in entry.errors.items()]
+        if entry.sweep:
+            lines.append(
+                "[at.sweep] # of small commands, flown on sixdof: heading rate over its command, rad/s, 1, rad"
+            )
+            lines += [
+                f"{name} = [{', '.join(f'{v:.5g}' for v in values)}]"
+                for name, values in zip(Sweep._fields, entry.sweep, strict=True)
+            ]
     return "\n".join(lines) + "\n"
 
 
@@ -119,7 +146,12 @@ def _from(table: Mapping[str, Any]) -> Identified:
         bank_limit=float(table["bank_limit"]),
         measured=MappingProxyType(_numbers(table["measured"])),
         errors=MappingProxyType({name: (float(a), float(b)) for name, (a, b) in table["errors"].items()}),
+        sweep=_sweep(table["sweep"]) if "sweep" in table else None,
     )
+
+
+def _sweep(table: Mapping[str, Any]) -> Sweep:
+    return Sweep._make(tuple(float(value) for value in table[name]) for name in Sweep._fields)
 
 
 def _numbers(table: Mapping[str, Any]) -> dict[str, float]:

@@ -4,6 +4,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from operator import mul
 from typing import Annotated, NamedTuple, Self
 
@@ -99,18 +100,29 @@ class Response:
 
         From a command held for `period` seconds to the output's first and second integral at the sampling instants.
         """
-        A, b, c = self.matrices()
-        n = len(b)
-        system = np.zeros((n + 3, n + 3))
-        system[:n, :n], system[:n, -1], system[n, :n], system[n + 1, n] = A, b, c, 1.0
-        periods = math.floor(self.delay / period)  # whole ones in the delay
-        late = self.delay - periods * period
-        before, after = expm(system * late), expm(system * (period - late))
-        step = (after @ before)[:-1, :-1]
-        now, earlier = after[:-1, -1], after[:-1, :-1] @ before[:-1, -1]
+        periods, step, now, earlier = _held(self, period)
+        n = len(now) - 2
         drive = np.multiply.outer(z, now) + earlier  # times 1/z: the command of this period and of the one before
         left = z[:, np.newaxis, np.newaxis] * np.eye(n + 2) - step
         return np.asarray(np.linalg.solve(left, drive[:, :, np.newaxis])[:, n:, 0] * z[:, np.newaxis] ** (-periods - 1))
+
+
+@lru_cache(maxsize=64)
+def _held(response: Response, period: float) -> tuple[int, Array, Array, Array]:
+    """A response, its integral and that one's, under commands held for `period`, s.
+
+    The whole periods in its delay; how a period moves the states; what the command of this period and the one before
+    add to them.
+    """
+    A, b, c = response.matrices()
+    n = len(b)
+    system = np.zeros((n + 3, n + 3))
+    system[:n, :n], system[:n, -1], system[n, :n], system[n + 1, n] = A, b, c, 1.0
+    periods = math.floor(response.delay / period)
+    late = response.delay - periods * period
+    before, after = expm(system * late), expm(system * (period - late))
+    step = (after @ before)[:-1, :-1]
+    return periods, step, after[:-1, -1], after[:-1, :-1] @ before[:-1, -1]
 
 
 def plain(delay: float, frequency: float, damping: float) -> Response:
