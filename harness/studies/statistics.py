@@ -1,24 +1,24 @@
 """Proof of the verdict's statistics: results whose truth is planted, and how often the words for them are right.
 
-`python -m harness.studies.statistics [FOLDER]` writes docs/reference/statistics.md and its figure.
+`python -m harness.studies.statistics` writes docs/reference/statistics.md and its figure.
 """
 
 import math
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+import click
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from harness.drawing import draw
-from harness.files import replacing
 from harness.margins import Assess
+from harness.studies.command import run, write
 from harness.template import template
 from harness.verdict.conditions import Conclusion, conclude
 from harness.verdict.judgement import Judgement, judged
@@ -256,19 +256,23 @@ def figure(proof: Proof) -> str:
     return draw(paint, width=7.0, height=3.6)
 
 
-def main(folder: Path) -> None:
-    """Computes, and writes page and figure."""
+@click.command()
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("docs/reference"),
+    show_default=True,
+    help="The folder to write to.",
+)
+def main(out: Path) -> None:
+    """Plant truths in results and count how often the words for them are right; write OUT/statistics.md, its figure."""
     proof = prove()
-    images = folder / "images"
-    images.mkdir(parents=True, exist_ok=True)
     page = template("harness.studies", "statistics.md.jinja").render(
         proof=proof, seeds=SEEDS, floors=FLOORS, scatters=list(SCATTERS), replications=REPLICATIONS,
         least_seeds=LEAST_SEEDS, cells=CELLS, most_wrong=MOST_WRONG, least_found=LEAST_FOUND,
     )  # fmt: skip
-    for path, text in ((images / "coverage.svg", figure(proof)), (folder / "statistics.md", page + "\n")):
-        with replacing(path) as partial_path:
-            partial_path.write_text(text, encoding="utf-8")
+    write(out, {"images/coverage.svg": figure(proof), "statistics.md": page + "\n"})
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs/reference"))
+    run(main, "harness.studies.statistics")
