@@ -18,9 +18,9 @@ from harness.studies.paper.reproduce import (
     Number,
     Reproduced,
     Value,
+    formatted,
     moved,
     reproduced,
-    shown,
     table,
     under,
 )
@@ -67,7 +67,7 @@ def test_an_interval_agrees_when_both_its_ends_do() -> None:
     assert number.agrees((7.6, 17.4))
     assert not number.agrees((7.6, 17.6))
     assert not number.agrees(None)
-    assert shown(number, (0.0, 41.07)) == "0-41"
+    assert formatted(number, (0.0, 41.07)) == "0-41"
 
 
 def test_manoeuvres_are_read_with_the_acceleration_unknown_and_the_turn_rate_known() -> None:

@@ -50,7 +50,7 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
             partial.write_text(text, encoding="utf-8")
     for line in numbers.table(everything.numbers):
         click.echo(line)
-    click.echo(f"\n{fill(f'Ours, with one thing read differently: {numbers.VARIANTS_TOLD}.', 120)}")
+    click.echo(f"\n{fill(f'Ours, with one thing read differently: {numbers.VARIANTS_IN_WORDS}.', 120)}")
     for line in numbers.moved(everything.numbers):
         click.echo(line)
     click.echo("\nThe claims:")

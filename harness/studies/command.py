@@ -45,8 +45,8 @@ def _end(message: str, code: int) -> None:
 
 def write(folder: Path, texts: Mapping[str, str]) -> None:
     """Writes each text whole to the file of its name, and says where. OSError when a file cannot be written."""
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         with replacing(folder / name) as partial:
             partial.write_text(text, encoding="utf-8")
         click.echo(folder / name)

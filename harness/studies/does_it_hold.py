@@ -236,9 +236,9 @@ def short_answer(comparison: Comparison) -> Iterator[str]:
     for aircraft in dict.fromkeys(column[0] for column in at_limit.columns):
         i = next(i for i, column in enumerate(at_limit.columns) if column[:2] == (aircraft, PAPERS_LIMIT))
         clauses = [
-            f"{title} {cells[i].word} ({plain(abs(cells[i].worst.difference))} {unit})"
+            f"{title} {cell.word} ({plain(abs(cell.worst.difference))} {unit})"
             for title, unit, cells in at_limit.rows
-            if cells[i] is not None
+            if (cell := cells[i]) is not None
         ]
         n = next(card.seeds for card in comparison.scorecards if card.aircraft == aircraft)
         yield f"{aircraft}: {', '.join(clauses)}; worst of all laws, {counted(n, 'seed')} each."

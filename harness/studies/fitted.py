@@ -52,10 +52,10 @@ class Pair(NamedTuple):
 
 def trace(experiment: str, alpha2: float, beta2: float, period: float | None = None, duration: float = 0.0) -> Trace:
     """NFTSM with these coefficients in one of the paper's experiments."""
-    one = flight(experiment, "NFTSM", duration=duration or EXPERIMENTS[experiment].measured)
-    steering = law(*LAWS["NFTSM"], alpha2=alpha2, beta2=beta2, max_heading_rate=one.law.max_heading_rate)
-    period = period or one.guidance_period
-    return flown(replace(one, law=steering, guidance_period=period, step=min(0.005, period)))
+    paper_flight = flight(experiment, "NFTSM", duration=duration or EXPERIMENTS[experiment].measured)
+    steering = law(*LAWS["NFTSM"], alpha2=alpha2, beta2=beta2, max_heading_rate=paper_flight.law.max_heading_rate)
+    period = period or paper_flight.guidance_period
+    return flown(replace(paper_flight, law=steering, guidance_period=period, step=min(0.005, period)))
 
 
 def pair_of(pair: tuple[float, float, float]) -> Pair:

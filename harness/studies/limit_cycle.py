@@ -45,11 +45,11 @@ def airframe_of(name: str) -> tuple[Path, Identified]:
     return airframe, identified(airframe, aircraft.limits(airframe).design_airspeed)
 
 
-def loop_of(one: Identified, k2: float = PAPER_K2, k3: float = PAPER_K3, limit_deg_s: float = 5.0) -> Loop:
+def loop_of(known: Identified, k2: float = PAPER_K2, k3: float = PAPER_K3, limit_deg_s: float = 5.0) -> Loop:
     """NFTSM with these reaching gains on the paper's circle, at 25 m/s as much wider, behind the response."""
-    standoff = 200.0 * one.airspeed / 13.0
+    standoff = 200.0 * known.airspeed / 13.0
     nftsm = law("nftsm", "fitted", k2=k2, k3=k3, standoff=standoff, max_heading_rate=math.radians(limit_deg_s))
-    return Loop(nftsm, one.heading_rate, one.airspeed, PERIOD)
+    return Loop(nftsm, known.heading_rate, known.airspeed, PERIOD)
 
 
 def with_gains(loop: Loop, k2: float, k3: float) -> Loop:
@@ -74,16 +74,16 @@ class FlownCycle(NamedTuple):
 def cycles() -> Iterator[FlownCycle]:
     """The paper's gains on each airframe at each heading-rate limit."""
     for name in AIRFRAMES:
-        airframe, one = airframe_of(name)
+        airframe, known = airframe_of(name)
         for limit in LIMITS_DEG_S:
-            loop = loop_of(one, limit_deg_s=limit)
-            reversals = [flown(airframe, one.airspeed, held([limit, -limit] * 12, each)) for each in (0.5, 0.7, 1.0)]
+            loop = loop_of(known, limit_deg_s=limit)
+            reversals = [flown(airframe, known.airspeed, held([limit, -limit] * 12, each)) for each in (0.5, 0.7, 1.0)]
             slow = fit([of_heading_rate(record) for record in reversals])
             yield FlownCycle(
                 airframe=name,
                 limit_deg_s=limit,
                 sixdof=fly(loop, SixDof(airframe, STEP, rate_trim=True)),
-                lagged=fly(loop, one.lagged),
+                lagged=fly(loop, known.lagged),
                 predicted=limit_cycle(loop),
                 one_harmonic=limit_cycle(loop, harmonics=1),
                 slow=limit_cycle(replace(loop, response=slow)),
@@ -94,7 +94,7 @@ class Border(NamedTuple):
     """Where an airframe's limit cycle begins: gains k2 with k3 = k2/2, and times that its inner loop is as quick."""
 
     airframe: str
-    one: Identified
+    known: Identified
     critical: float  # 1/s
     k2: float  # predicted
     k2_linear: float  # the same with k3 = 0
@@ -106,20 +106,20 @@ class Border(NamedTuple):
 
 def border(name: str) -> Border:
     """Predicted, and found by bisection in flight."""
-    airframe, one = airframe_of(name)
-    loop, sixdof = loop_of(one), SixDof(airframe, STEP, rate_trim=True)
+    airframe, known = airframe_of(name)
+    loop, sixdof = loop_of(known), SixDof(airframe, STEP, rate_trim=True)
     k2 = boundary(lambda q: with_gains(loop, q, 0.5 * q), 3.0)
     quicker = boundary(lambda q: replace(loop, response=loop.response.quicker(q)), 4.0)
     return Border(
         airframe=name,
-        one=one,
+        known=known,
         critical=critical_gain(loop.response, PERIOD)[0],
         k2=k2,
         k2_linear=boundary(lambda q: with_gains(loop, q, 0.0), 3.0),
         k2_flown=_bisected(lambda q: fly(with_gains(loop, q, 0.5 * q), sixdof), k2),
         quicker=quicker,
         quicker_flown=_bisected(lambda q: fly(loop, Lagged(loop.response.quicker(q))), quicker),
-        faded=fly(with_gains(loop, 0.7 * k2, 0.35 * k2), one.lagged).command,
+        faded=fly(with_gains(loop, 0.7 * k2, 0.35 * k2), known.lagged).command,
     )
 
 
@@ -150,7 +150,7 @@ def map_figure(borders: Sequence[Border]) -> str:
     """The map as SVG: gains against the inner loop's bandwidth, and the two gains against each other."""
     lines, points, own = [], [], []  # of each airframe
     for b in borders:
-        loop = loop_of(b.one)
+        loop = loop_of(b.known)
         bandwidth = loop.response.bandwidth
         line = [(q * bandwidth, _largest_k2(loop, q)) for q in np.geomspace(_QUICKER[0], _QUICKER[-1], 13)]
         lines.append(line)
@@ -172,7 +172,7 @@ def map_figure(borders: Sequence[Border]) -> str:
                 for k2 in (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 12.0)
             ]
         )
-    first = loop_of(borders[0].one)
+    first = loop_of(borders[0].known)
     plane = {q: _plane(first, q) for q in (1.0, 2.0, 4.0)}
     grid = {
         q: [
@@ -296,8 +296,8 @@ def borders_csv(borders: Sequence[Border]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     columns: Mapping[str, Callable[[Border], float]] = {
-        "bandwidth rad/s": lambda b: b.one.heading_rate.bandwidth,
-        "lag s (63 %)": lambda b: b.one.measured["lag_s"],
+        "bandwidth rad/s": lambda b: b.known.heading_rate.bandwidth,
+        "lag s (63 %)": lambda b: b.known.measured["lag_s"],
         "critical gain 1/s": lambda b: b.critical,
         "k2 with k3 = 0, 1/s": lambda b: b.k2_linear,
         "k2 with k3 = k2/2, 1/s": lambda b: b.k2,

@@ -26,7 +26,7 @@ from harness.world.wind import SEVERITIES
 if TYPE_CHECKING:
     import pandas as pd
 
-SHOWN = {  # metric: heading, decimals
+COLUMNS = {  # metric: heading, decimals
     "airspeed_deviation_rms_mps": ("airspeed m/s rms", 2),
     "altitude_deviation_peak_m": ("height m peak", 1),
     "sideslip_rms_deg": ("sideslip ° rms", 2),
@@ -72,7 +72,7 @@ def survivals(flights: "pd.DataFrame") -> list[Survival]:
         ended = {outcome: int(counts.get(outcome, 0)) for outcome in OUTCOMES}
         low, high = binomtest(ended["completed"], len(group)).proportion_ci(method="wilson")
         air = f"{severity}{'' if rotation else ', no rotation'}"
-        means = {metric: float(group[metric].mean()) for metric in SHOWN}
+        means = {metric: float(group[metric].mean()) for metric in COLUMNS}
         name = f"{airframe}, {airspeed:g} m/s"
         lines.append(Survival(air, name, len(group), ended, (100.0 * low, 100.0 * high), means))
     return lines
@@ -81,13 +81,13 @@ def survivals(flights: "pd.DataFrame") -> list[Survival]:
 def rotation(flights: "pd.DataFrame") -> list[Added]:
     """What turning air adds, one for each airframe in each air; none without such pairs."""
     alike = [*(key for key in GROUPED_BY if key != "wind.rotation"), "seed"]
-    turning, still = (flights[flights["wind.rotation"] == on].set_index(alike)[list(SHOWN)] for on in (True, False))
+    turning, still = (flights[flights["wind.rotation"] == on].set_index(alike)[list(COLUMNS)] for on in (True, False))
     added = (turning - still).dropna()
     return [
         Added(
             f"{severity}, {airframe}, {airspeed:g} m/s",
             len(group),
-            {metric: float(group[metric].mean()) for metric in SHOWN},
+            {metric: float(group[metric].mean()) for metric in COLUMNS},
         )
         for (severity, airframe, airspeed), group in added.groupby(alike[:-1], sort=False)
     ]
@@ -97,18 +97,18 @@ def survivals_csv(lines: Sequence[Survival]) -> str:
     """The table of all that was flown."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("turbulence", "airframe", "flights", *OUTCOMES, "low %", "high %", *SHOWN))
+    writer.writerow(("turbulence", "airframe", "flights", *OUTCOMES, "low %", "high %", *COLUMNS))
     for line in lines:
         counts = [line.ended[outcome] for outcome in OUTCOMES]
         interval = [f"{end:.1f}" for end in line.interval]
-        means = [f"{line.means[metric]:.{decimals}f}" for metric, (_, decimals) in SHOWN.items()]
+        means = [f"{line.means[metric]:.{decimals}f}" for metric, (_, decimals) in COLUMNS.items()]
         writer.writerow((line.turbulence, line.airframe, line.flights, *counts, *interval, *means))
     return text.getvalue()
 
 
 def page(lines: Sequence[Survival], added: Sequence[Added]) -> str:
     """The page."""
-    return template("harness.studies", "turbulence.md.jinja").render(lines=lines, added=added, shown=SHOWN) + "\n"
+    return template("harness.studies", "turbulence.md.jinja").render(lines=lines, added=added, metrics=COLUMNS) + "\n"
 
 
 def spectra(step: float) -> Iterator[tuple[str, Array, Array, Array]]:

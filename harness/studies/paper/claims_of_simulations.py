@@ -21,21 +21,21 @@ from harness.studies.paper.measures import (
     restricted,
     settled,
 )
-from harness.studies.paper.reproduce import NUMBERS, shown
+from harness.studies.paper.reproduce import NUMBERS, formatted
 
 _LAWS = ("NFTSM", "NFTSM_1", "SMC")
 
 
 def _numbers(on: Column, where: str, *, printed_gains: bool = False) -> Decision:
     """How many of a section's printed numbers agree here."""
-    told, agreeing = [], 0
+    sentences, agreeing = [], 0
     wanted = [n for n in NUMBERS if n.where == where and (n.law == "NFTSM as printed") == printed_gains]
     for n in wanted:
         duration = EXPERIMENTS[n.experiment].measured
         ours = n.measure(*(on.paper(n.experiment, law, duration=duration) for law in (n.law, n.against) if law))
         agreeing += n.agrees(ours)
-        told.append(f"{n.law} {shown(n, ours)} ({n.printed})")
-    return decide(agreeing == len(wanted), f"{agreeing} of {len(wanted)}, ours (printed): " + ", ".join(told))
+        sentences.append(f"{n.law} {formatted(n, ours)} ({n.printed})")
+    return decide(agreeing == len(wanted), f"{agreeing} of {len(wanted)}, ours (printed): " + ", ".join(sentences))
 
 
 def table_3(on: Column) -> Decision:
@@ -69,13 +69,13 @@ def all_circle(on: Column) -> Decision:
 
 def nftsm_is_faster(on: Column) -> Decision:
     """To 1 m and to the column's tolerance, from both starts."""
-    told, fine = [], True
+    sentences, fine = [], True
     for experiment in ("30", "130"):
         for tolerance in sorted({1.0, on.tolerance}, reverse=True):
             a, b = (settled(on.paper(experiment, label), tolerance) for label in ("NFTSM", "SMC"))
             fine = fine and sooner(a, b)
-            told.append(f"from {experiment}° to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
-    return decide(fine, "; ".join(told))
+            sentences.append(f"from {experiment}° to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
+    return decide(fine, "; ".join(sentences))
 
 
 def larger_gains_overshoot(on: Column) -> Decision:
@@ -103,22 +103,22 @@ def slower_from_130(on: Column) -> Decision:
 def restricted_8_to_17(on: Column) -> Decision:
     """When NFTSM's command is at the limit."""
     spans = {experiment: restricted(on.paper(experiment, "NFTSM")) for experiment in ("30", "130")}
-    told = [f"from {e}° " + (f"{span[0]:.1f} to {span[1]:.1f} s" if span else "never") for e, span in spans.items()]
+    times = [f"from {e}° " + (f"{span[0]:.1f} to {span[1]:.1f} s" if span else "never") for e, span in spans.items()]
     right = any(span is not None and (round(span[0]), round(span[1])) == (8, 17) for span in spans.values())
-    return decide(right, "at the limit first " + ", ".join(told))
+    return decide(right, "at the limit first " + ", ".join(times))
 
 
 def mobility(on: Column) -> Decision:
     """How hard the two laws steer, from 130 deg, first 60 s."""
-    told, rates = [], []
+    sentences, rates = [], []
     for label in ("NFTSM", "SMC"):
         log = on.paper("130", label)
         command = np.degrees(log["heading_rate_command"][log["time"] < 60.0])
         rates.append((float(np.abs(command).max()), float(np.mean(np.abs(command) > 0.9998 * on.limit))))
-        told.append(
+        sentences.append(
             f"{label} up to {rates[-1][0]:.2f} deg/s, at the limit {100.0 * rates[-1][1]:.0f} % of the first 60 s"
         )
-    return decide(rates[0][1] > 0.25 and rates[1][1] == 0.0, "; ".join(told))
+    return decide(rates[0][1] > 0.25 and rates[1][1] == 0.0, "; ".join(sentences))
 
 
 def they_stay(on: Column) -> Decision:
@@ -135,12 +135,12 @@ def they_stay(on: Column) -> Decision:
 
 def faster_round_the_s(on: Column) -> Decision:
     """NFTSM against SMC."""
-    told, fine = [], True
+    sentences, fine = [], True
     for tolerance in sorted({1.0, on.tolerance}, reverse=True):
         a, b = (settled(on.paper("S", label, duration=330.0), tolerance) for label in ("NFTSM", "SMC"))
         fine = fine and sooner(a, b)
-        told.append(f"to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
-    return decide(fine, "; ".join(told))
+        sentences.append(f"to {tolerance:g} m NFTSM {within(a)}, SMC {within(b)}")
+    return decide(fine, "; ".join(sentences))
 
 
 def slow_adjustment(on: Column) -> Decision:
@@ -191,7 +191,7 @@ def _reading(**changed: Any) -> Reading:
     return replace(EXPERIMENTS["manoeuvres"].reading, **changed)
 
 
-def _told(peaks: dict[str, float]) -> str:
+def _peaks_in_words(peaks: dict[str, float]) -> str:
     return ", ".join(f"{metres(x)} in {span}" for span, x in peaks.items())
 
 
@@ -213,8 +213,8 @@ def all_return(on: Column) -> Decision:
     """|r| in the last 100 of 900 s, and of NFTSM_1 without its limit."""
     ends = {label: peak(on.paper("manoeuvres", label), 800.0) for label in _LAWS}
     free = peak(on.paper("manoeuvres", "NFTSM_1", _reading(limited=False)), 800.0)
-    told = ", ".join(f"{label} {metres(x)}" for label, x in ends.items())
-    number = f"|r| from 800 s on: {told}; NFTSM_1 without its limit {metres(free)}"
+    sentences = ", ".join(f"{label} {metres(x)}" for label, x in ends.items())
+    number = f"|r| from 800 s on: {sentences}; NFTSM_1 without its limit {metres(free)}"
     returned = {label: x < ON_THE_CIRCLE for label, x in (*ends.items(), ("free", free))}
     return decide(
         all(returned[label] for label in _LAWS),
@@ -243,12 +243,12 @@ def adjusts_in_turns(on: Column) -> Decision:
 def only_smc_is_off(on: Column) -> Decision:
     """While the target accelerates, and up to the next manoeuvre."""
     peaks = {label: (_span(on, label, 300.0, 350.0), _span(on, label, 350.0, 399.0)) for label in _LAWS}
-    told = ", ".join(f"{label} {metres(a)} and {metres(b)}" for label, (a, b) in peaks.items())
+    sentences = ", ".join(f"{label} {metres(a)} and {metres(b)}" for label, (a, b) in peaks.items())
     stable = {label: max(pair) < ON_THE_CIRCLE for label, pair in peaks.items()}
     until_350_s = peaks["SMC"][0] > 10.0 and all(peaks[label][0] < ON_THE_CIRCLE for label in ("NFTSM", "NFTSM_1"))
     return decide(
         until_350_s and stable["NFTSM"] and stable["NFTSM_1"],
-        f"|r| while it accelerates, and until 399 s: {told} (printed: 17.4 m for SMC; NFTSM_1 is limited to "
+        f"|r| while it accelerates, and until 399 s: {sentences} (printed: 17.4 m for SMC; NFTSM_1 is limited to "
         f"{on.limited}, the circle of a target at 7 m/s takes up to {_circle_takes(on, 7.0):.1f})",
         under={"one looks no further than 350 s": until_350_s},
     )
@@ -256,9 +256,9 @@ def only_smc_is_off(on: Column) -> Decision:
 
 def _circle_takes(on: Column, speed: float) -> float:
     """The largest heading rate on the circle of a target of this speed, (v_a + w)^2 / (v_a R_d), deg/s."""
-    one = on.change(flight("manoeuvres", "NFTSM_1"))
-    v_a, wind = one.start.airspeed, math.hypot(*one.wind.steady)
-    return math.degrees((v_a + speed + wind) ** 2 / (v_a * one.law.standoff))
+    paper_flight = on.change(flight("manoeuvres", "NFTSM_1"))
+    v_a, wind = paper_flight.start.airspeed, math.hypot(*paper_flight.wind.steady)
+    return math.degrees((v_a + speed + wind) ** 2 / (v_a * paper_flight.law.standoff))
 
 
 def _span(on: Column, label: str, begin: float, end: float, reading: Reading | None = None) -> float:
@@ -302,10 +302,10 @@ def sensitive_to_speed(on: Column) -> Decision:
         for name, reading in known.items()
     }
     sensitive = {name: speed > 2.0 * turn for name, (speed, turn) in spans.items()}
-    told = "; ".join(f"{name} {metres(a)} and {metres(b)}" for name, (a, b) in spans.items())
+    sentences = "; ".join(f"{name} {metres(a)} and {metres(b)}" for name, (a, b) in spans.items())
     return decide(
         all(sensitive.values()),
-        f"|r| while accelerating, and in and after the sharp turn, by what the law knows: {told}",
+        f"|r| while accelerating, and in and after the sharp turn, by what the law knows: {sentences}",
         under={"it knows the target's turn rate and not its acceleration": sensitive.get("turn rate only", False)},
     )
 
@@ -343,7 +343,7 @@ def more_sensitive_to_turns(on: Column) -> Decision:
     """NFTSM: turning against accelerating."""
     peaks = _peaks(on, "NFTSM")
     blind = _peaks(on, "NFTSM", _reading(known=NEITHER))
-    number = f"NFTSM {_told(peaks)}; knowing neither acceleration nor turn rate {_told(blind)}"
+    number = f"NFTSM {_peaks_in_words(peaks)}; knowing neither acceleration nor turn rate {_peaks_in_words(blind)}"
     more, more_blind = (each["400-410 s"] > each["300-350 s"] for each in (peaks, blind))
     return decide(more and more_blind, number, under={"it does not know the turn rate": more_blind})
 
@@ -358,9 +358,9 @@ def delayed(on: Column) -> Decision:
     """SMC's heading behind the others'."""
     logs = {label: on.paper("manoeuvres", label, duration=600.0) for label in _LAWS}
     behind = {label: delay(logs["SMC"], logs[label]) for label in ("NFTSM", "NFTSM_1")}
-    told = ", ".join(f"behind {label} {'-' if x is None else f'{x:.1f} s'}" for label, x in behind.items())
+    sentences = ", ".join(f"behind {label} {'-' if x is None else f'{x:.1f} s'}" for label, x in behind.items())
     lag = behind["NFTSM"]
-    return decide(lag is not None and round(lag, 1) == 10.3, f"SMC passes 180° {told}")
+    return decide(lag is not None and round(lag, 1) == 10.3, f"SMC passes 180° {sentences}")
 
 
 # Conclusions
@@ -400,8 +400,8 @@ def alpha2_and_beta2(on: Column) -> Decision:
     times: dict[tuple[float, float], float | None] = {}
     shocks: dict[tuple[float, float], float] = {}
     for pair in ((0.1, 2.4), (0.2, 2.4), (0.4, 2.4), (0.8, 2.4), (1.6, 2.4), (0.4, 1.2), (0.4, 4.8)):
-        one = flight("30", "NFTSM", Reading(period=0.005))
-        log = on.fly(replace(one, law=law(*LAWS["NFTSM"], alpha2=pair[0], beta2=pair[1])))
+        paper_flight = flight("30", "NFTSM", Reading(period=0.005))
+        log = on.fly(replace(paper_flight, law=law(*LAWS["NFTSM"], alpha2=pair[0], beta2=pair[1])))
         times[pair], shocks[pair] = settled(log, ON_THE_CIRCLE), overshoot(log)
         lines.append(f"({pair[0]:g}, {pair[1]:g}) {within(times[pair])}, {metres(shocks[pair])}")
     small, fitted, large = (0.1, 2.4), (0.4, 2.4), (1.6, 2.4)

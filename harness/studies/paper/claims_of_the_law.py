@@ -84,9 +84,9 @@ def coordinated(on: Column) -> Decision:
 
 def flies_by_course(on: Column) -> Decision:
     """NFTSM in 3.6 m/s of wind, by heading and by course, limited to 10 deg/s."""
-    one = replace(own("NFTSM", Target(), 100.0, 10.0), wind=Wind(steady=(3.0, 2.0)))
-    by_course = replace(one, law=law(*LAWS["NFTSM"], max_heading_rate=math.radians(10.0), command="course_rate"))
-    times = [settled(on.fly(each), 1.0) for each in (one, by_course)]
+    by_heading = replace(own("NFTSM", Target(), 100.0, 10.0), wind=Wind(steady=(3.0, 2.0)))
+    by_course = replace(by_heading, law=law(*LAWS["NFTSM"], max_heading_rate=math.radians(10.0), command="course_rate"))
+    times = [settled(on.fly(each), 1.0) for each in (by_heading, by_course)]
     return decide(
         times[1] is not None,
         f"in 3.6 m/s of wind within 1 m {within(times[1])} by ground speed and course, {within(times[0])} by "
@@ -105,29 +105,29 @@ def _held(on: Column, speed: float, limit_deg_s: float) -> bool:
         return False
 
 
-def _fastest(one: Flight) -> float:
+def _fastest(paper_flight: Flight) -> float:
     """The fastest straight target whose circle the limit allows, by (v_a + w)^2 / (v_a R_d), w = |wind - v_t|; m/s."""
-    v_a = one.start.airspeed
-    w = math.sqrt(one.law.max_heading_rate * v_a * one.law.standoff) - v_a
-    (W_x, W_y), psi_t = one.wind.steady, STRAIGHT.heading
+    v_a = paper_flight.start.airspeed
+    w = math.sqrt(paper_flight.law.max_heading_rate * v_a * paper_flight.law.standoff) - v_a
+    (W_x, W_y), psi_t = paper_flight.wind.steady, STRAIGHT.heading
     along, across = W_x * math.cos(psi_t) + W_y * math.sin(psi_t), W_y * math.cos(psi_t) - W_x * math.sin(psi_t)
     return along + math.sqrt(w * w - across * across) if w > abs(across) else 0.0
 
 
 def remark_1_is_enough(on: Column) -> Decision:
     """The fastest straight target round which NFTSM keeps within 1 m, to 0.1 m/s, with the limit and without."""
-    found = []  # m/s, with the limit and without
+    fastest = []  # m/s, with the limit and without
     for limit in (5.0, math.inf):
         low, high = 0, 130  # tenths of a metre per second
         while high - low > 1:
             middle = (low + high) // 2
             low, high = (middle, high) if _held(on, middle / 10.0, limit) else (low, middle)
-        found.append(low / 10.0)
+        fastest.append(low / 10.0)
     bound = _fastest(on.change(own("NFTSM", _straight(0.0), 300.0, 5.0)))
-    limited, free = found
-    fast_limited, fast_free = (f"up to v_t = {most:.1f} m/s" if most else "not at 0.1 m/s" for most in found)
+    limited, free = fastest
+    fast_limited, fast_free = (f"up to v_t = {most:.1f} m/s" if most else "not at 0.1 m/s" for most in fastest)
     return decide(
-        min(found) > NEARLY_AS_FAST,
+        min(fastest) > NEARLY_AS_FAST,
         f"within 1 m of the circle {fast_limited} at {on.limited} (the formula: {bound:.2f}), {fast_free} without a "
         "limit",
         under={"the limit allows (v_a + w)²/(v_a R_d)": free > NEARLY_AS_FAST and limited > 0.0},
@@ -146,20 +146,20 @@ def faster_target_flees(on: Column) -> Decision:
 
 def definition_1(on: Column) -> Decision:
     """The three conditions: r and r' at the end, and for how long r r' > 0, from both starts."""
-    told, fine = [], []
+    sentences, fine = [], []
     for experiment, label in (("30", "NFTSM"), ("30", "NFTSM_1"), ("130", "NFTSM")):
         log = on.paper(experiment, label)
         r, time = log["range_error"], log["time"]
         r_dot = np.gradient(r, time)
         away = float(np.mean((r * r_dot > 0.0) & (np.abs(r) > on.tolerance))) * float(time[-1])
         fine.append(away < 0.1 and abs(r[-1]) < on.tolerance)
-        told.append(
+        sentences.append(
             f"{label} from {experiment}°: r {metres(abs(r[-1]))}, ṙ {metres(abs(r_dot[-1]))}/s at the end, r ṙ "
             f"> 0 for {away:.1f} s"
         )
     return decide(
         all(fine),
-        "; ".join(told),
+        "; ".join(sentences),
         under={"there is no overshoot and the start is not turned away": fine[0]},
     )
 
@@ -198,7 +198,7 @@ def follows_behind(on: Column) -> Decision:
 
 def v1_falls(on: Column) -> Decision:
     """V1 = s^2/2 along the paper's flights, free and at the limit."""
-    told, free_fine, limited_fine = [], True, True
+    sentences, free_fine, limited_fine = [], True, True
     for experiment, label in (("30", "NFTSM"), ("130", "NFTSM"), ("30", "NFTSM_1")):
         log = on.paper(experiment, label)
         V1, period = 0.5 * log["sliding_variable"] ** 2, log.flight.guidance_period
@@ -206,14 +206,14 @@ def v1_falls(on: Column) -> Decision:
         rises = (np.diff(V1) > 0.0) & (V1[:-1] > 1e-12)
         while_free, at_limit = period * (rises & free).sum(), period * (rises & ~free).sum()
         free_fine, limited_fine = free_fine and not while_free, limited_fine and not at_limit
-        told.append(f"{label} from {experiment}° {while_free:.2g} s while free, {at_limit:.2g} s at the limit")
-    number = "V1 rises: " + ", ".join(told)
+        sentences.append(f"{label} from {experiment}° {while_free:.2g} s while free, {at_limit:.2g} s at the limit")
+    number = "V1 rises: " + ", ".join(sentences)
     return decide(free_fine and limited_fine, number, under={"the command is not at its limit": free_fine})
 
 
 def eq_25_bounds_the_flight(on: Column) -> Decision:
     """When |s| is down to 1e-3 rad, against Eq. (25), without a limit and with the paper's."""
-    told: list[str] = []
+    sentences: list[str] = []
     times, bound = [], 0.0
     for limit in (math.inf, 5.0):
         log = on.fly(own("NFTSM", Target(), 60.0, limit, 0.001 if on.tolerance < 1e-3 else 0.05))
@@ -223,11 +223,11 @@ def eq_25_bounds_the_flight(on: Column) -> Decision:
         steering = log.flight.law
         assert isinstance(steering, Nftsm)
         bound = reaching_time(steering, float(s[0]))
-        told.append(
+        sentences.append(
             f"{'never' if math.isinf(times[-1]) else f'{times[-1]:.2f} s'} "
-            f"{f'at {on.limited}' if told else 'without a limit'}"
+            f"{f'at {on.limited}' if sentences else 'without a limit'}"
         )
-    number = f"the bound is {bound:.2f} s; |s| is below 1e-3 after " + ", ".join(told)
+    number = f"the bound is {bound:.2f} s; |s| is below 1e-3 after " + ", ".join(sentences)
     return decide(max(times) <= bound, number, under={"there is no limit": times[0] <= bound})
 
 
@@ -254,14 +254,14 @@ def reaches_zero(on: Column) -> Decision:
 def sampling(on: Column, label: str) -> Decision:
     """The longest guidance period, of those that the column tries, at which the law converges from 30 deg."""
     limited = _converging(on, label, flight("30", label).law)
-    told = [f"from 30° to {tolerance:g} m {_longest(each)}" for tolerance, each in limited.items()]
+    sentences = [f"from 30° to {tolerance:g} m {_longest(each)}" for tolerance, each in limited.items()]
     free = law(*LAWS[label], max_heading_rate=math.inf)
     if isinstance(free, Nftsm):
         unlimited = _converging(on, label, free)
         for i, (tolerance, each) in enumerate(unlimited.items()):
             bound = longest_stable_period(free, manifold(free, math.atan(free.k1 * tolerance))[0])
-            told[i] += f", unlimited {_longest(each)} (the bound from k2 and k3: {_period(bound)})"
-    return decide(limited[1.0][0.5], "; ".join(told))
+            sentences[i] += f", unlimited {_longest(each)} (the bound from k2 and k3: {_period(bound)})"
+    return decide(limited[1.0][0.5], "; ".join(sentences))
 
 
 def _converging(on: Column, label: str, steering: Law) -> dict[float, dict[float, bool]]:
@@ -270,19 +270,19 @@ def _converging(on: Column, label: str, steering: Law) -> dict[float, dict[float
     converged: dict[float, dict[float, bool]] = {1.0: {}, on.tolerance: {}}
     for period in (each for each in on.periods if each <= longest):
         length = period * round(duration / period)
-        one = replace(flight("30", label), law=steering, guidance_period=period, step=_STEP, duration=length)
-        if problems(on.change(one)):  # the column's measurements do not fit this period
+        paper_flight = replace(flight("30", label), law=steering, guidance_period=period, step=_STEP, duration=length)
+        if problems(on.change(paper_flight)):  # the column's measurements do not fit this period
             continue
-        late = _late_error(on, one)
+        late = _late_error(on, paper_flight)
         for tolerance, each in converged.items():
             each[period] = late < tolerance
     return converged
 
 
-def _late_error(on: Column, one: Flight) -> float:
+def _late_error(on: Column, paper_flight: Flight) -> float:
     """The largest |r| in the last tenth of the flight, m."""
     try:
-        return peak(on.sampled(one), 0.9 * one.duration)
+        return peak(on.sampled(paper_flight), 0.9 * paper_flight.duration)
     except EndedEarlyError:
         return math.inf
 

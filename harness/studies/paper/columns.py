@@ -52,33 +52,33 @@ class Column(NamedTuple):
     period: float | None = None  # s, for which a command is held; None: as the experiment's reading has it
     periods: tuple[float, ...] = EVERY_PERIOD  # s, tried by claims about sampling
 
-    def real(self, one: Flight) -> Flight:
+    def real(self, paper_flight: Flight) -> Flight:
         """The flight as it is flown here."""
-        one = scaled(self.change(one), self.scale)
-        return replace(one, plant="sixdof", aircraft=self.aircraft) if self.aircraft else one
+        paper_flight = scaled(self.change(paper_flight), self.scale)
+        return replace(paper_flight, plant="sixdof", aircraft=self.aircraft) if self.aircraft else paper_flight
 
-    def held(self, one: Flight) -> Flight:
+    def held(self, paper_flight: Flight) -> Flight:
         """The flight with its command held as long as it is here."""
-        return one if self.period is None else replace(one, guidance_period=self.period, step=_STEP)
+        return paper_flight if self.period is None else replace(paper_flight, guidance_period=self.period, step=_STEP)
 
-    def sampled(self, one: Flight) -> Trace:
+    def sampled(self, paper_flight: Flight) -> Trace:
         """That flight here, its command held as long as it says. Raises `EndedEarlyError`."""
-        trace = flown(self.real(one))
+        trace = flown(self.real(paper_flight))
         if trace.ended:
-            raise early(one, trace.ended, trace.failed)
-        return trace if self.scale == 1.0 else _in_papers_size(trace, self.change(one), self.scale)
+            raise early(paper_flight, trace.ended, trace.failed)
+        return trace if self.scale == 1.0 else _in_papers_size(trace, self.change(paper_flight), self.scale)
 
-    def measured(self, one: Flight) -> Mapping[str, float | None]:
+    def measured(self, paper_flight: Flight) -> Mapping[str, float | None]:
         """The metrics of that flight here, airspeeds in the paper's size. Raises `EndedEarlyError`."""
-        values, ended, failed = _measured(self.real(self.held(one)))
+        values, ended, failed = _measured(self.real(self.held(paper_flight)))
         if ended:
-            raise early(one, ended, failed)
+            raise early(paper_flight, ended, failed)
         off = values["airspeed_deviation_rms_mps"]
         return {**values, "airspeed_deviation_rms_mps": None if off is None else off / self.scale}
 
-    def fly(self, one: Flight) -> Trace:
+    def fly(self, paper_flight: Flight) -> Trace:
         """That flight here. Raises `EndedEarlyError`."""
-        return self.sampled(self.held(one))
+        return self.sampled(self.held(paper_flight))
 
     def paper(self, experiment: str, law: str, reading: Reading | None = None, duration: float | None = None) -> Trace:
         """An experiment of the paper's here, under its reading unless told another. Raises `EndedEarlyError`."""
@@ -96,16 +96,16 @@ class Column(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _measured(one: Flight) -> tuple[Mapping[str, float | None], str, bool]:
+def _measured(paper_flight: Flight) -> tuple[Mapping[str, float | None], str, bool]:
     """The metrics of a flight, how it ended where it did before its time, and whether it failed: asked for twice."""
-    log = simulate(one)
+    log = simulate(paper_flight)
     return measure(log), ending(log), log.outcome.failed
 
 
-def early(one: Flight, how: str, failed: bool) -> Exception:
+def early(paper_flight: Flight, how: str, failed: bool) -> Exception:
     """What to raise when this flight ended so."""
     kind = FlightFailedError if failed else EndedEarlyError
-    return kind(f"the flight of {label(one.law)} over {one.duration:g} s ended: {how}")
+    return kind(f"the flight of {label(paper_flight.law)} over {paper_flight.duration:g} s ended: {how}")
 
 
 def label(law: Law) -> str:
@@ -120,17 +120,17 @@ _LENGTHS = ("north", "east", "range_error", "target_north", "target_east", "targ
             "target_velocity_east")  # fmt: skip
 
 
-def scaled(one: Flight, scale: float) -> Flight:
+def scaled(paper_flight: Flight, scale: float) -> Flight:
     """The similar flight: lengths and speeds times `scale`, times and rates as they are; gains in 1/m over it."""
     if scale == 1.0:
-        return one
-    law, start, target = one.law, one.start, one.target
+        return paper_flight
+    law, start, target = paper_flight.law, paper_flight.start, paper_flight.target
     if isinstance(law, Nftsm):
         law = replace(law, standoff=scale * law.standoff, k1=law.k1 / scale)
     elif isinstance(law, Smc):
         law = replace(law, standoff=scale * law.standoff, c2=law.c2 / scale)
     return replace(
-        one,
+        paper_flight,
         law=law,
         start=replace(start, position=_times(scale, start.position), airspeed=scale * start.airspeed),
         target=replace(
@@ -139,7 +139,7 @@ def scaled(one: Flight, scale: float) -> Flight:
             speed=scale * target.speed,
             segments=tuple(replace(each, acceleration=scale * each.acceleration) for each in target.segments),
         ),
-        wind=replace(one.wind, steady=_times(scale, one.wind.steady)),
+        wind=replace(paper_flight.wind, steady=_times(scale, paper_flight.wind.steady)),
     )
 
 
@@ -147,34 +147,36 @@ def _times(scale: float, vector: tuple[float, float]) -> tuple[float, float]:
     return (scale * vector[0], scale * vector[1])
 
 
-def _in_papers_size(trace: Trace, one: Flight, scale: float) -> Trace:
+def _in_papers_size(trace: Trace, paper_flight: Flight, scale: float) -> Trace:
     columns = {name: x / scale if name in _LENGTHS else x for name, x in trace.columns.items()}
-    return Trace(one, columns, trace.ended)
+    return Trace(paper_flight, columns, trace.ended)
 
 
-def _same(one: Flight) -> Flight:
-    return one
+def _same(paper_flight: Flight) -> Flight:
+    return paper_flight
 
 
-def _estimating(one: Flight) -> Flight:
-    return replace(one, estimator=EKF)
+def _estimating(paper_flight: Flight) -> Flight:
+    return replace(paper_flight, estimator=EKF)
 
 
-def _windy(one: Flight) -> Flight:
-    return one if any(one.wind.steady) else replace(one, wind=replace(one.wind, steady=(2.0, 0.0)))
+def _windy(paper_flight: Flight) -> Flight:
+    if any(paper_flight.wind.steady):
+        return paper_flight
+    return replace(paper_flight, wind=replace(paper_flight.wind, steady=(2.0, 0.0)))
 
 
-def _turbulent(one: Flight) -> Flight:
-    return replace(one, wind=replace(one.wind, turbulence="moderate"))
+def _turbulent(paper_flight: Flight) -> Flight:
+    return replace(paper_flight, wind=replace(paper_flight.wind, turbulence="moderate"))
 
 
-def _steep(one: Flight, limit: float, standoff: float | None = None) -> Flight:
+def _steep(paper_flight: Flight, limit: float, standoff: float | None = None) -> Flight:
     """The limit, where there is one, raised to this one, rad/s; and another circle, m."""
-    law = one.law
+    law = paper_flight.law
     assert isinstance(law, Nftsm | Smc)
     if not math.isinf(law.max_heading_rate):
         law = replace(law, max_heading_rate=limit)
-    return replace(one, law=replace(law, standoff=standoff or law.standoff))
+    return replace(paper_flight, law=replace(law, standoff=standoff or law.standoff))
 
 
 # The paper's aircraft, as the paper has it.

@@ -73,7 +73,7 @@ class PaperExperiment(NamedTuple):
     reading: Reading = Reading()
     unlimited: frozenset[str] = frozenset()  # laws flown without the limit of Eq. (2)
 
-    def told(self) -> str:
+    def in_words(self) -> str:
         """The reading in words."""
         who = f"5 deg/s on all laws but {' and '.join(sorted(self.unlimited))}" if self.unlimited else "5 deg/s"
         return f"{self.reading}; limit {who}"

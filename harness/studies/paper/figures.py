@@ -81,12 +81,12 @@ def paths(figure: Figure, cases: Mapping[str, Sketches]) -> None:
 
 
 def over_time(
-    figure: Figure, cases: Mapping[str, Sketches], shown: Mapping[str, tuple[str, str, tuple[float, float] | None]]
+    figure: Figure, cases: Mapping[str, Sketches], rows: Mapping[str, tuple[str, str, tuple[float, float] | None]]
 ) -> None:
     """Quantities over time: a panel per case and row; `shown` maps a row to quantity, label and limits."""
-    grid = figure.subplots(len(shown), len(cases), sharex="col", squeeze=False)
+    grid = figure.subplots(len(rows), len(cases), sharex="col", squeeze=False)
     for j, (title, laws) in enumerate(cases.items()):
-        for i, (quantity, label, limits) in enumerate(shown.values()):
+        for i, (quantity, label, limits) in enumerate(rows.values()):
             for name, drawn in laws.items():
                 grid[i, j].plot(*drawn[quantity], color=COLOURS[name], lw=0.9, label=name)
             grid[i, j].set(ylabel=label, ylim=limits)

@@ -10,7 +10,7 @@ from harness.studies.paper.experiments import EXPERIMENTS
 from harness.studies.paper.figures import LAWS_DRAWN, Sketch
 from harness.studies.paper.job import Reproduction, Sketches
 from harness.studies.paper.ledger import cells, counts
-from harness.studies.paper.reproduce import VARIANTS, VARIANTS_TOLD, shown
+from harness.studies.paper.reproduce import VARIANTS, VARIANTS_IN_WORDS, formatted
 from harness.template import template
 from harness.vocabulary import Verdict
 
@@ -24,8 +24,8 @@ def page(everything: Reproduction) -> str:
         results=everything.numbers,
         agreeing=sum(result.agrees for result in everything.numbers),
         variants=list(VARIANTS),
-        variants_told=VARIANTS_TOLD,
-        shown=shown,
+        variants_told=VARIANTS_IN_WORDS,
+        formatted=formatted,
         experiments=EXPERIMENTS.values(),
         figures=_figures(everything.sketches),
         claims=CLAIMS,
@@ -59,22 +59,22 @@ def _figures(sketches: Sketches) -> dict[str, str]:
         "Figures 2 and 3. Terminal and fast terminal sliding modes.": draw(figures.terminal_modes),
         "Figure 4. Paths round a stationary target.": draw(partial(figures.paths, cases=stationary), height=4.4),
         "Figure 5. Distance error and sliding variable, stationary target.": draw(
-            partial(over_time, cases=stationary, shown=errors), height=5.0
+            partial(over_time, cases=stationary, rows=errors), height=5.0
         ),
         "Figure 6. Heading rate and heading, stationary target.": draw(
-            partial(over_time, cases=stationary, shown=rates), height=5.0
+            partial(over_time, cases=stationary, rows=rates), height=5.0
         ),
         "Figure 7. Paths round a target in an S; its shape is ours, the paper gives none.": draw(
             partial(figures.paths, cases=s_shape), height=4.4
         ),
         "Figure 8. Distance error and sliding variable, round the S.": draw(
-            partial(over_time, cases=s_shape, shown=errors), height=5.0
+            partial(over_time, cases=s_shape, rows=errors), height=5.0
         ),
         "Figure 9a. The manoeuvring target.": draw(
             partial(figures.target_profile, drawn=sketches["manoeuvres", "SMC"]), height=2.6
         ),
         "Figure 9b. Paths round the manoeuvring target.": draw(partial(figures.paths, cases=manoeuvring), height=7.0),
         "Figure 10. Distance error (whole and near), heading rate, heading, round the manoeuvring target.": draw(
-            partial(over_time, cases=manoeuvring, shown=near), height=7.5
+            partial(over_time, cases=manoeuvring, rows=near), height=7.5
         ),
     }

@@ -44,7 +44,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # one thing at a 
         "EKF": {"known": EKF},
     }
 )
-VARIANTS_TOLD = (
+VARIANTS_IN_WORDS = (
     "command held for 1 ms to 0.5 s (the paper's sampling); the wind of Table 1; every law limited to 5 deg/s, or "
     "none; the law told the target's acceleration a and turn rate w, one of them, neither; or the EKF with the "
     "paper's noise"
@@ -72,7 +72,7 @@ class Number(NamedTuple):
         if ours is None or self.value is None:
             return ours is self.value
         if isinstance(ours, tuple) or isinstance(self.value, tuple):
-            return ours == self.value or shown(self, ours) == shown(self, self.value)
+            return ours == self.value or formatted(self, ours) == formatted(self, self.value)
         return ours <= self.value if self.at_most else round(ours, self.places) == self.value
 
 
@@ -134,14 +134,14 @@ def reproduced(numbers: tuple[Number, ...]) -> list[Reproduced]:
     """
     first = numbers[0]
     reading = EXPERIMENTS[first.experiment].reading
-    found = {"": [under(number, reading) for number in numbers]}
+    by_reading = {"": [under(number, reading) for number in numbers]}
     for name, changed in VARIANTS.items():
         other = replace(reading, **changed)
         if flight(first.experiment, first.law, other) != flight(first.experiment, first.law, reading):
-            found[name] = [under(number, other) for number in numbers]
-    ours = found.pop("")
+            by_reading[name] = [under(number, other) for number in numbers]
+    ours = by_reading.pop("")
     return [
-        Reproduced(number, ours[i], number.agrees(ours[i]), {name: values[i] for name, values in found.items()})
+        Reproduced(number, ours[i], number.agrees(ours[i]), {name: values[i] for name, values in by_reading.items()})
         for i, number in enumerate(numbers)
     ]
 
@@ -159,7 +159,7 @@ def in_order(results: list[Reproduced]) -> list[Reproduced]:
     return sorted(results, key=lambda result: NUMBERS.index(result.number))
 
 
-def shown(number: Number, value: Value) -> str:
+def formatted(number: Number, value: Value) -> str:
     """A value of ours with as many decimals as the paper prints, or a dash for none."""
     if value is None:
         return "-"
@@ -174,7 +174,7 @@ def table(results: list[Reproduced]) -> list[str]:
     for r in results:
         n = r.number
         agrees = "yes" if r.agrees else "no"
-        lines.append(f"{n.where:8}{n.law:18}{n.what:36}{n.printed:>13}{shown(n, r.ours):>8} {agrees:>6}")
+        lines.append(f"{n.where:8}{n.law:18}{n.what:36}{n.printed:>13}{formatted(n, r.ours):>8} {agrees:>6}")
     return lines
 
 
@@ -183,6 +183,6 @@ def moved(results: list[Reproduced]) -> list[str]:
     lines = [f"{'law':18}{'what':36}{'ours':>7}" + "".join(f"{name:>9}" for name in VARIANTS)]
     for r in results:
         n = r.number
-        others = (shown(n, r.otherwise[name]) if name in r.otherwise else "." for name in VARIANTS)
-        lines.append(f"{n.law:18}{n.what:36}{shown(n, r.ours):>7}" + "".join(f"{text:>9}" for text in others))
+        others = (formatted(n, r.otherwise[name]) if name in r.otherwise else "." for name in VARIANTS)
+        lines.append(f"{n.law:18}{n.what:36}{formatted(n, r.ours):>7}" + "".join(f"{text:>9}" for text in others))
     return lines
