@@ -59,14 +59,15 @@ class Cell(NamedTuple):
 
 def core(flights: "pd.DataFrame") -> "pd.DataFrame":
     """The undisturbed flights: still air, the target known, the shortest guidance period, the nominal airspeed."""
-    still = flights["wind.steady_mps"].map(lambda wind: not any(wind))
-    return flights[
+    still = flights["wind.steady_mps"].map(lambda wind: not any(wind)).astype(bool)
+    quiet: pd.DataFrame = flights[
         still
         & (flights["wind.turbulence"] == "none")
         & (flights["estimator.kind"] == "truth")
         & (flights["guidance_period_s"] == flights["guidance_period_s"].min())
         & (flights["law.airspeed"] == "nominal")
     ].reset_index(drop=True)
+    return quiet
 
 
 def compared(flights: "pd.DataFrame", assess: Assess) -> Comparison:

@@ -11,6 +11,7 @@ from harness.margins import Assess
 from harness.metric import METRICS
 from harness.plants.ladder import BASELINE
 from harness.verdict.conditions import Conclusion, conclude
+from harness.verdict.following import with_following
 from harness.verdict.judgement import Judgement, frame, judged
 from harness.verdict.pairs import (
     FAILED,
@@ -162,10 +163,10 @@ def compare_flights(
     if baseline is None:
         values = ordered(flights[by])
         baseline = BASELINE if by == "plant" else values[0]
-    table = with_shares(entered(flights, assess.circling_error))
+    assumption = by == "plant" and shown(baseline) == BASELINE
+    table = with_shares(entered(with_following(flights) if assumption else flights, assess.circling_error))
     paired = pairs_by(table, by, baseline)
     failed = table["outcome"].isin(FAILED)
-    assumption = by == "plant" and shown(baseline) == BASELINE
     return Comparison(
         by,
         shown(baseline),

@@ -18,6 +18,7 @@ from harness.plants.identified import is_stale
 from harness.plants.ladder import PLANTS
 from harness.settings import flight_from_document
 from harness.settings.columns import is_setting, nested
+from harness.verdict.pairs import joined
 
 COLUMNS = ("heading_rate_gain_slow", "heading_rate_delay_s", "limit_cycle_margin", "predicted_cycle_hz",
            "predicted_cycle_amplitude_deg_s")  # fmt: skip
@@ -28,7 +29,7 @@ def with_following(flights: pd.DataFrame) -> pd.DataFrame:
     """The flights with `COLUMNS`; flights of equal law, airframe, airspeed and period are predicted once."""
     keys = ["plant", "aircraft", "start.airspeed_mps", "guidance_period_s"]
     keys += [column for column in flights.columns if column.startswith("law.")]
-    rows = flights[keys].astype(str).agg("|".join, axis=1)
+    rows = joined(flights, [key for key in keys if key in flights])
     known: dict[str, tuple[float, ...]] = {}
     for text, index in zip(rows, flights.index, strict=True):
         if text not in known:
@@ -45,7 +46,7 @@ def _predicted(row: Mapping[Any, Any]) -> tuple[float, ...]:
     keep = ("plant", "aircraft", "guidance_period_s", "start.airspeed_mps")
     chosen = {key: value for key, value in settings.items() if key in keep or key.startswith("law.")}
     try:
-        flight = flight_from_document(nested({**chosen, "duration_s": 1000.0 * settings["guidance_period_s"]}))
+        flight = flight_from_document(nested({**chosen, "duration_s": 100.0 * settings["guidance_period_s"]}))
         if is_stale(aircraft.folder(flight.aircraft)):
             return unknown
         return _numbers(following(flight))
