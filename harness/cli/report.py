@@ -30,7 +30,7 @@ def report(
     \b
     Examples:
       harness report out/wind
-      harness report out/assumption --markdown docs/results.md
+      harness report out/wind --markdown wind.md
     """
     from harness.cli._comparison import read_comparison
     from harness.cli._input import BadInput

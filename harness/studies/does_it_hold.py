@@ -46,7 +46,7 @@ class Statement(NamedTuple):
     options: str
 
 
-class Cell(NamedTuple):
+class PartCell(NamedTuple):
     """A part on an airframe at a limit and on a circle: the word over all laws, and the worst of them."""
 
     word: Verdict
@@ -155,14 +155,14 @@ def followed(comparison: Comparison) -> Iterator[Followed]:
             )  # fmt: skip
 
 
-class Matrix(NamedTuple):
+class PartMatrix(NamedTuple):
     """Parts by airframe and condition."""
 
     columns: list[tuple[str, float, float]]  # airframe, limit deg/s, radius m
-    rows: list[tuple[str, str, list[Cell | None]]]  # part, unit, cells
+    rows: list[tuple[str, str, list[PartCell | None]]]  # part, unit, cells
 
 
-def matrix(comparison: Comparison) -> Matrix:
+def matrix(comparison: Comparison) -> PartMatrix:
     """The parts of coordinated flight, over all laws, at each limit and on each circle."""
     columns = [
         (card.aircraft, limit, radius)
@@ -175,16 +175,16 @@ def matrix(comparison: Comparison) -> Matrix:
             cells = [_cell(comparison, part.column, *column) for column in columns]
             if any(cells):
                 rows.append((part.title, part.unit, cells))
-    return Matrix(columns, rows)
+    return PartMatrix(columns, rows)
 
 
-def _cell(comparison: Comparison, column: str, aircraft: str, limit: float, radius: float) -> Cell | None:
+def _cell(comparison: Comparison, column: str, aircraft: str, limit: float, radius: float) -> PartCell | None:
     card = next(card for card in comparison.scorecards if card.aircraft == aircraft)
     judgements = [judgement for judgement in card.of(column) if _circle(judgement) == (limit, radius)]
     if not judgements:
         return None
     worst = max(judgements, key=lambda judgement: (judgement.word == Verdict.FAILS, judgement.use))
-    return Cell(conclude(judgements, {}).word, worst)
+    return PartCell(conclude(judgements, {}).word, worst)
 
 
 def _circle(judgement: Judgement) -> tuple[float, float]:
