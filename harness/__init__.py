@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from autopilot.estimator import Estimator
     from autopilot.guidance import Guidance, Law, Observation
     from autopilot.laws import law
-    from harness.comparison import Comparison, compare
+    from harness.comparison import compare
     from harness.error import HarnessError, SettingsError
     from harness.flight import Flight, InnerLoop, MetricSettings
     from harness.interface import metrics, read_flight, record, run, simulate
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from harness.runs.store import StoreError
     from harness.runs.workers import WorkersError
     from harness.settings import load_flight
+    from harness.verdict.comparison import Comparison
     from harness.verdict.pairs import CompareError
     from harness.world.target import Segment, Target
     from harness.world.track import TrackError

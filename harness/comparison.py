@@ -1,7 +1,6 @@
 """Flights that differ in one setting alone, compared: what a notebook asks of the results of a run."""
 
-import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -9,13 +8,10 @@ import pandas as pd
 from harness.error import did_you_mean
 from harness.margins import Assess
 from harness.metric import METRICS
-from harness.runs.results import load_results, mixed_versions
+from harness.runs.comparable import flights_and_margins
 from harness.runs.store import last_run
-from harness.settings import settings_from_text
 from harness.verdict.comparison import Comparison, compare_flights
 from harness.verdict.pairs import CompareError, settings_of
-
-__all__ = ["Comparison", "compare", "flights_and_margins"]
 
 _NEEDED = ("key", "outcome", "plant", "aircraft", "seed", "duration_s", "law.name", "law.standoff_m", *METRICS)
 
@@ -57,31 +53,6 @@ def compare_chosen(
     if by not in settings_of(flights):
         raise CompareError(_unknown("by", by, settings_of(flights)))
     return compare_flights(_chosen(flights, where), assess, by, baseline, question)
-
-
-def flights_and_margins(folder: Path, overrides: Sequence[str] = ()) -> tuple[pd.DataFrame, Assess]:
-    """The flights of a run, and the margins that its settings and command line say; `overrides`: assess.KEY=VALUE.
-
-    Raises `StoreError`, `SettingsError`; `CompareError` when the flights are of different versions.
-    """
-    of = last_run(folder)
-    where = Path(f"{folder} (its copy of {of['file']})")
-    assess = settings_from_text(of["settings"], where, [*_given(of["command"]), *overrides]).assess()
-    if mixed := mixed_versions(folder):
-        raise CompareError(
-            f"{folder}: its flights are of different versions, which a comparison must not mix: {'; '.join(mixed)}. "
-            "Fly them again into another directory"
-        )
-    return load_results(folder), assess
-
-
-def _given(command: str) -> Iterator[str]:
-    """The margins that a command line set."""
-    words = shlex.split(command)
-    for i, word in enumerate(words):
-        text = word.removeprefix("--set=") if word.startswith("--set=") else words[i + 1] if word == "--set" else ""
-        if text.strip().startswith("assess."):
-            yield text
 
 
 def _checked(results: pd.DataFrame) -> pd.DataFrame:

@@ -231,7 +231,7 @@ def test_a_browser_shows_all_of_the_page(page: Path, tmp_path: Path) -> None:
     dom = done.stdout
     shown = re.findall(r'<section[^>]* id="(\w+)"', dom)
     assert shown == ["answer", "parts", "scorecards", "ladder", "flights", "method"]
-    assert dom.count("<svg") == 4  # a figure for each group of parts, and the waterfalls of two cells
+    assert dom.count("<svg") == 5  # a figure for each group of parts, and the waterfalls of two cells
     assert dom.count("harness view") == 2  # the worst and the middle one
     assert "Compared: plant = sixdof beside kinematic" in dom
     assert "CONSOLE" not in done.stderr  # where the browser says what the page's policy forbids

@@ -20,8 +20,9 @@ def read_comparison(
     where: tuple[str, ...] = (),
 ) -> tuple[Comparison, Origin]:
     """The comparison of a run's directory. BadInput when it holds none, with what is missing."""
-    from harness.comparison import compare_chosen, flights_and_margins
+    from harness.comparison import compare_chosen
     from harness.error import SettingsError
+    from harness.runs.comparable import flights_and_margins
     from harness.runs.store import StoreError, last_run
     from harness.verdict.pairs import CompareError
     from harness.verdict.report import origin_of

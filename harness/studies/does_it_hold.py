@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from harness.comparison import flights_and_margins
 from harness.files import replacing
 from harness.margins import Assess
+from harness.runs.comparable import flights_and_margins
 from harness.studies.command import out_option, run, write
 from harness.template import template
 from harness.verdict.answer import counted, interval, plain, signed, unit_of
