@@ -6,7 +6,7 @@ and its n, and the command that repeats it.
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 PLANTS = ("kinematic", "sixdof")
 PAPERS_LIMIT = 5.0  # deg/s
 MAIN_LAW = "nftsm fitted"  # the paper's law with the gains that give its Table 3
+OTHER_TOLERANCES = ("convergence_time_half_tolerance_s", "convergence_time_double_tolerance_s")
 QUIET = (
     "--where wind.turbulence=none --where 'wind.steady_mps=[0.0, 0.0]' --where estimator.kind=truth "
     "--where guidance_period_s=0.05 --where law.airspeed=nominal"
@@ -90,22 +91,33 @@ def still_air(comparison: Comparison) -> Iterator[Statement]:
                 if len(rows := flown[flown["plant"] == plant])
             ]
             clauses = [f"converges in {' and '.join(shares)}"]
-            clauses += [
-                clause
-                for column in ("convergence_time_s", "range_error_rms_m")
-                for clause in _clause(card, column, cell)
-            ]
+            clauses += _clauses(card, cell, _at_other_tolerances(flown))
             clauses.append(_cycle(flown[flown["plant"] == PLANTS[1]]))
             options = f"{QUIET} --where aircraft={card.aircraft} --where law.max_heading_rate_deg_s={PAPERS_LIMIT:g}"
             yield Statement(f"{card.aircraft}, {law}: {'; '.join(clauses)}.", options)
 
 
-def _clause(card: Scorecard, column: str, at: dict[str, object]) -> Iterator[str]:
-    names = {"convergence_time_s": "later by", "range_error_rms_m": "settled error"}
-    for judgement in card.of(column):
-        if dict(judgement.at) == at and judgement.pairs:
-            n = f"n = {judgement.pairs}"
-            yield f"{names[column]} {number(judgement)} ({n})"
+def _at_other_tolerances(flown: "pd.DataFrame") -> list[float]:
+    """The mean differences of the convergence times at half of the tolerance and at twice of it, s."""
+    by_plant = flown.set_index("seed").groupby("plant")
+    first, second = (by_plant.get_group(plant) for plant in PLANTS)
+    return [float((second[name] - first[name]).mean()) for name in OTHER_TOLERANCES]
+
+
+def _clauses(card: Scorecard, at: Mapping[str, object], others: list[float]) -> Iterator[str]:
+    """How much later the law converges than on the kinematic aircraft, and by how much more it errs on the circle."""
+    cell = {j.column: j for j in card.judgements if dict(j.at) == at and j.pairs}
+    if (time := cell.get("convergence_time_s")) is not None:
+        when = "later" if time.difference > 0 else "sooner"
+        low, high = sorted((abs(time.low), abs(time.high))) if time.low * time.high > 0 else (math.nan, math.nan)
+        between = "" if math.isnan(low) or low == high else f" [{plain(low)}, {plain(high)}]"
+        text = f"{plain(abs(time.difference))}{between} s {when} (n = {time.pairs})"
+        if any(other * time.difference < 0 for other in others):
+            told = ", ".join(f"{signed(other)} s" for other in others)
+            text += f", a sign that changes with the tolerance ({told} at half and at twice of it)"
+        yield text
+    if (error := cell.get("range_error_rms_m")) is not None:
+        yield f"settled error {number(error)} (n = {error.pairs})"
 
 
 def _cycle(flown: "pd.DataFrame") -> str:
@@ -236,13 +248,17 @@ def short_answer(comparison: Comparison) -> Iterator[str]:
     at_limit = matrix(comparison)
     for aircraft in dict.fromkeys(column[0] for column in at_limit.columns):
         i = next(i for i, column in enumerate(at_limit.columns) if column[:2] == (aircraft, PAPERS_LIMIT))
-        clauses = [
-            f"{title} {cell.word} ({plain(abs(cell.worst.difference))} {unit})"
-            for title, unit, cells in at_limit.rows
-            if (cell := cells[i]) is not None
-        ]
+        clauses = []
+        for word in (Verdict.HOLDS, Verdict.FAILS, Verdict.UNDECIDED):
+            parts = [
+                f"{title} ({plain(abs(cell.worst.difference))} {unit})"
+                for title, unit, cells in at_limit.rows
+                if (cell := cells[i]) is not None and cell.word is word
+            ]
+            if parts:
+                clauses.append(f"{word}: {', '.join(parts)}")
         n = next(card.seeds for card in comparison.scorecards if card.aircraft == aircraft)
-        yield f"{aircraft}: {', '.join(clauses)}; worst of all laws, {counted(n, 'seed')} each."
+        yield f"{aircraft}: {'; '.join(clauses)}. The worst of three laws, {counted(n, 'seed')} each."
 
 
 def page(flights: "pd.DataFrame", assess: Assess, folder: str) -> tuple[str, str]:
