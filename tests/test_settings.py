@@ -288,3 +288,27 @@ def test_whatever_a_key_is_set_to_there_is_a_flight_that_can_be_told_or_lines_th
         json.dumps([document(flight), warnings(flight), feasibility_margin(flight)])
     assert len(flights) > 20
     assert len(told) > 500
+
+
+# What a file leaves to the airframe's speed
+
+
+def test_without_an_airspeed_a_flight_has_that_of_its_airframe() -> None:
+    for name, airspeed in (("ultra_stick_25e", 13.0), ("skywalker_x8", 13.0), ("aerosonde", 25.0)):
+        flight = flight_from_document({"plant": "sixdof", "aircraft": name, "law": {"name": "smc"}})
+        assert flight.start.airspeed == airspeed
+    given = {"plant": "sixdof", "aircraft": "aerosonde", "law": {"name": "smc"}, "start": {"airspeed_mps": 20.0}}
+    assert flight_from_document(given).start.airspeed == 20.0
+
+
+def test_a_length_may_be_the_way_flown_in_some_seconds() -> None:
+    """The paper's 200 m at 13 m/s are 15.38 s; at 25 m/s they are 384.6 m."""
+    settings: dict[str, object] = {
+        "plant": "kinematic", "aircraft": "aerosonde", "law": {"name": "smc", "standoff_m": "15.384615 s"},
+        "start": {"position_m": ["-15 s", 200.0], "altitude_m": 150.0},
+    }  # fmt: skip
+    flight = flight_from_document(settings)
+    assert flight.law.standoff == pytest.approx(384.615, abs=1e-3)
+    assert flight.start.position == (-375.0, 200.0)
+    with pytest.raises(SettingsError, match=r'law.standoff_m: is "15 m", must be a number'):
+        flight_from_document({**settings, "law": {"name": "smc", "standoff_m": "15 m"}})

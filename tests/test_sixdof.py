@@ -182,3 +182,16 @@ def test_a_start_near_the_ground_is_refused() -> None:
 def test_an_airspeed_without_trim_is_refused_with_what_is_allowed() -> None:
     with pytest.raises(PlantError, match=r"no level trim at 7 m/s.* from 11\.5 to 25 m/s"):
         SixDof(STICK, STEP, True).start(Start(airspeed=7.0), Air())
+
+
+@pytest.mark.parametrize("name", aircraft.names())
+def test_a_command_moves_the_surfaces_in_its_own_step_and_the_aircraft_in_the_next(name: str) -> None:
+    airspeed = aircraft.limits(aircraft.folder(name)).design_airspeed
+    flying = SixDof(aircraft.folder(name), 0.005, True).start(Start(airspeed=airspeed), Air())
+    before = flying.state
+    flying.advance(math.radians(5.0), 0.005)
+    first = flying.state
+    flying.advance(math.radians(5.0), 0.005)
+    assert abs(first.aileron - before.aileron) > math.radians(0.1)
+    assert abs(first.roll_rate - before.roll_rate) < 1e-12
+    assert abs(flying.state.roll_rate - before.roll_rate) > 1e-4

@@ -20,6 +20,7 @@ from harness.settings.experiment import CUSTOM, Experiment, document_table
 from harness.settings.former_names import without_former_names
 from harness.settings.keys import file_key, put
 from harness.settings.mistake import Mistake, Place, Places, settings_error
+from harness.settings.speed import at_own_speed
 from harness.settings.table import TableSchema, schema_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
 
@@ -160,6 +161,10 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
             table = document_table(name, law.get("gains") == CUSTOM)
         case _:
             table = document_table(None, False)
+    given = document.get("flight")
+    schema = table.settings["flight"].table
+    if isinstance(given, Mapping) and schema is not None:
+        document = {**document, "flight": at_own_speed(given, schema)}
     flight = checked(table, document, place)
     assert isinstance(flight, Flight)
     if flight.target.track is not None:
