@@ -13,6 +13,7 @@ word is false.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ LEAST_EQUAL = 14  # equal draws exclude, at 95 %, that one seed in five differs:
 MOST_SEEDS = 10_000  # beyond it "more seeds" is no advice
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sample:
     """The differences of one cell, as means of seeds."""
 
@@ -49,7 +50,7 @@ class Sample:
         """Nothing is left to chance: nothing was drawn, or enough draws are all equal."""
         return self.seeds > 0 and not self.varies and (not self.drawn or self.seeds >= LEAST_EQUAL)
 
-    @property
+    @cached_property
     def varies(self) -> bool:
         """Whether the seeds differ by more than rounding."""
         return bool(len(self.means)) and bool(np.ptp(self.means) > 1e-9 * max(1e-3, float(np.abs(self.means).max())))
@@ -77,7 +78,7 @@ class Sample:
         if not self.is_judged:
             return None
         T = float(special.stdtrit(self._degrees, 0.5 + 0.5 * CONFIDENCE))
-        scale, a = self._scale()
+        scale, a = self._scale
         low = max(T, _untransformed(T, a))
         high = min(-T, _untransformed(-T, a))
         return self.mean - low * scale, self.mean - high * scale
@@ -88,23 +89,30 @@ class Sample:
             return 0.0 if self.mean > bound else 1.0
         if not self.is_judged:
             return 1.0
-        scale, a = self._scale()
+        scale, a = self._scale
         T = (self.mean - bound) / scale
         return float(special.stdtr(self._degrees, -min(T, _transformed(T, a))))
 
     def p_below(self, bound: float) -> float:
         """The same for a mean below the bound."""
-        return self.shifted(0.0, -1.0).p_above(-bound)
+        if self.is_exact:
+            return 0.0 if self.mean < bound else 1.0
+        if not self.is_judged:
+            return 1.0
+        scale, a = self._scale
+        T = (self.mean - bound) / scale
+        return float(special.stdtr(self._degrees, max(T, _transformed(T, a))))
 
-    def shifted(self, by: Array | float, sign: float = 1.0) -> "Sample":
-        """The sample of sign (means - by)."""
-        return Sample(sign * (self.means - by), self.pairs, self.drawn)
+    def less(self, by: Array) -> "Sample":
+        """The sample of what the seeds' means exceed these values by."""
+        return Sample(self.means - by, self.pairs, self.drawn)
 
     @property
     def _degrees(self) -> float:
         """Degrees of freedom of the quantiles."""
         return 0.5 * (self.seeds - 1)
 
+    @cached_property
     def _scale(self) -> tuple[float, float]:
         """The standard error, and the skewness over the root of the number of seeds."""
         n, d = self.seeds, self.means - self.means.mean()
@@ -146,15 +154,18 @@ class Evidence(NamedTuple):
 
 def evidence(of: Sample, low: Array | float | None, high: Array | float | None) -> Evidence:
     """Whether the mean lies within the bounds, numbers or one for each seed; None for a bound that is not there."""
-    above_low = of.shifted(low) if low is not None else None
-    above_high = of.shifted(high) if high is not None else None
-    inside = [above_low.p_above(0.0)] if above_low else []
-    inside += [above_high.p_below(0.0)] if above_high else []
-    outside = [above_low.p_below(0.0)] if above_low else []
-    outside += [above_high.p_above(0.0)] if above_high else []
     if of.is_exact:  # on the bound itself a number holds
         within = (low is None or of.mean >= np.mean(low)) and (high is None or of.mean <= np.mean(high))
         return Evidence(0.0, 1.0) if within else Evidence(1.0, 0.0)
+    inside, outside = [], []
+    if low is not None:
+        by_seed, bound = (of, low) if isinstance(low, float) else (of.less(low), 0.0)
+        inside.append(by_seed.p_above(bound))
+        outside.append(by_seed.p_below(bound))
+    if high is not None:
+        by_seed, bound = (of, high) if isinstance(high, float) else (of.less(high), 0.0)
+        inside.append(by_seed.p_below(bound))
+        outside.append(by_seed.p_above(bound))
     return Evidence(min(1.0, 2.0 * max(inside)), min(1.0, 2.0 * min(outside)))
 
 
