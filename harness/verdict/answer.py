@@ -33,18 +33,18 @@ def scorecard(card: Scorecard, comparison: Comparison) -> Iterator[str]:
         f"{counted(card.pairs, 'pair')}, {counted(card.seeds, 'seed')}{lost_flights}"
     )
     if not comparison.assumption:
-        yield from (f"  {line}" for line in _changes(card))
+        yield from (f"  {line}" for line in changes(card))
         return
     headings = ["part", "verdict", "worst cell, 95 % interval", "asked", "where"]
     rows: list[tuple[str, ...]] = []
-    notes: list[str] = []
+    remarks: list[str] = []
     for group in Group:
         parts = [part for part in card.parts if part.group is group]
         rows += [(f"{group}:",)] if parts else []
         rows += [_row(card, part) for part in parts]
-        notes += [note for part in parts for note in _notes(card, part)]
+        remarks += [remark for part in parts for remark in notes_on(card, part)]
     yield from (f"  {line}" for line in table(headings, rows))
-    yield from (f"  {note}" for note in notes)
+    yield from (f"  {remark}" for remark in remarks)
 
 
 def _row(card: Scorecard, part: Part) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ def _row(card: Scorecard, part: Part) -> tuple[str, ...]:
     return f"  {part.title}", f"{conclusion.word}{counts}", value(of), bound(of, part), "" if same else place(of.at)
 
 
-def _notes(card: Scorecard, part: Part) -> Iterator[str]:
+def notes_on(card: Scorecard, part: Part) -> Iterator[str]:
     """Under what condition, what the design cannot tell apart, and why cells are undecided."""
     conclusion = card.conclusion(part.column)
     if conclusion.condition:
@@ -127,7 +127,7 @@ def worded(conclusion: Conclusion) -> str:
     return text
 
 
-def _changes(card: Scorecard) -> Iterator[str]:
+def changes(card: Scorecard) -> Iterator[str]:
     """One line per metric that is lower or higher anywhere, and the parts that have a margin."""
     for column in dict.fromkeys(judgement.column for judgement in card.judgements):
         judgements = card.of(column)

@@ -143,6 +143,11 @@ class Comparison:
         return "\n".join(sentences(self))
 
     @property
+    def others(self) -> list[Scorecard]:
+        """The scorecards of the other values, the furthest from the baseline first."""
+        return [card for card in reversed(self.scorecards) if card.value != self.values[-1]]
+
+    @property
     def answering(self) -> list[Scorecard]:
         """The scorecards of the value furthest from the baseline: those that the answer is about."""
         return [card for card in self.scorecards if card.value == self.values[-1]]

@@ -14,7 +14,7 @@ from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
 from harness.verdict.pairs import shown, spread
 from harness.verdict.parts import PARTS, Group
 from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
-from harness.vocabulary import SIGNS, Verdict
+from harness.vocabulary import SIGNS
 
 MOST_FLIGHTS = 60  # pairs listed
 MOST_LADDERS = 12  # drawn: the page stays below 3 MB
@@ -57,10 +57,8 @@ def page(comparison: Comparison, origin: Origin) -> str:
     return template("harness.verdict", "report.html.jinja").render(
         comparison=comparison,
         origin=origin,
-        answer=comparison.answer.splitlines(),
+        head=[*answer.compared(comparison), *answer.lost(comparison)],
         words=answer,
-        signs=SIGNS,
-        Verdict=Verdict,
         groups=[group for group in Group if any(part.group is group for part in judged_parts)],
         parts=judged_parts,
         axes={axis: answer.values(values) for axis, values in comparison.axes.items()},

@@ -13,10 +13,9 @@ MOST_LISTED = 10
 def lines(comparison: Comparison) -> Iterator[str]:
     """All of it."""
     yield from sentences(comparison)
-    for card in comparison.scorecards:
-        if card not in comparison.answering:
-            yield ""
-            yield from scorecard(card, comparison)
+    for card in comparison.others:
+        yield ""
+        yield from scorecard(card, comparison)
     options = list(dict.fromkeys(missing_flights(comparison)))
     if options:
         yield ""
