@@ -20,8 +20,8 @@ from autopilot.quantities import About, Unit
 from autopilot.standoff import StandoffLaw
 from harness.cli.main import COMMANDS, harness, load
 from harness.flight import Flight
+from harness.log.metric import METRICS
 from harness.margins import Assess
-from harness.metric import METRICS
 from harness.plants.ladder import PLANTS
 from harness.settings.experiment import Experiment
 from harness.settings.table import Setting, schema_of

@@ -6,8 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 from harness.error import did_you_mean
+from harness.log.metric import METRICS
 from harness.margins import Assess
-from harness.metric import METRICS
 from harness.runs.comparable import flights_and_margins
 from harness.runs.store import last_run
 from harness.verdict.comparison import Comparison, compare_flights

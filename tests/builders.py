@@ -24,7 +24,7 @@ from autopilot.laws import law
 from harness.cli.main import harness as command_line
 from harness.flight import Flight
 from harness.log import COLUMNS, FlightLog
-from harness.metric import METRICS
+from harness.log.metric import METRICS
 from harness.plants.plant import Outcome
 from harness.runs.matrix import read_matrix
 from harness.runs.run import Options, Progress, run

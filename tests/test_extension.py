@@ -92,7 +92,7 @@ ENTRIES = {  # file: what stands there, and what is written before it
             '        "weak": PlantKind(about="It turns too slowly.", adds="weakness", make=lambda setup: Weak()),\n',
         ),
     ),
-    "harness/metric.py": (
+    "harness/log/metric.py": (
         (
             '    Metric(\n        name="turn_ratio"',
             "    Metric(\n"

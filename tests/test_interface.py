@@ -20,8 +20,8 @@ import aircraft
 import harness
 from harness.key import flight_key
 from harness.log import COLUMNS
+from harness.log.metric import measure
 from harness.loop import simulate
-from harness.metric import measure
 from tests.builders import DOCS, EXPERIMENTS, FLIGHT, ROOT, SIXDOF, command, python, result_matrix, shifted, write
 
 MATRIX = """\

@@ -16,8 +16,8 @@ from harness.checks import problems
 from harness.feasibility import warnings
 from harness.flight import Flight, plant_of
 from harness.key import flight_key
+from harness.log.metric import measure
 from harness.loop import simulate
-from harness.metric import measure
 from harness.plants.coordinated import AirspeedHold, Coordinated
 from harness.plants.identified import identified
 from harness.plants.kinematic import Kinematic

@@ -12,8 +12,8 @@ from harness.flight import Flight
 from harness.limit_cycle.margin import ENOUGH, Following, following, gain_margin
 from harness.limit_cycle.observed import fly
 from harness.limit_cycle.prediction import Loop, critical_gain, crossover, limit_cycle
+from harness.log.metric import measure
 from harness.loop import simulate
-from harness.metric import measure
 from harness.plants.identified import identified
 from harness.plants.lagged import Lagged
 from harness.plants.plant import Start

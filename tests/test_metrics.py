@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from autopilot.laws import law
 from harness.log import FlightLog
-from harness.metric import METRICS, YES_OR_NO, measure, window_in_words
+from harness.log.metric import METRICS, YES_OR_NO, measure, window_in_words
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting
 from harness.world.wind import Wind

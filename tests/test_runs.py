@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import harness
-from harness.metric import METRICS, YES_OR_NO
+from harness.log.metric import METRICS, YES_OR_NO
 from harness.runs.description import description
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, export, mixed_versions

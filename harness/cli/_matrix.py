@@ -103,7 +103,7 @@ def _fly(matrix: Matrix, out: Path, options: Options) -> Progress:
 
 def _print_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     """A table by the axes: medians over what is drawn, outcomes; then the failures, and where the results are."""
-    from harness.metric import METRICS
+    from harness.log.metric import METRICS
     from harness.plants.plant import Outcome
     from harness.runs.summary import summary
     from harness.tables import number, table

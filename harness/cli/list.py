@@ -46,7 +46,7 @@ def _plants() -> Iterator[str]:
 
 
 def _metrics() -> Iterator[str]:
-    from harness.metric import METRICS
+    from harness.log.metric import METRICS
     from harness.tables import table
 
     yield from table(["metric", "unit", "meaning"], ([m.name, m.unit, m.meaning] for m in METRICS.values()))

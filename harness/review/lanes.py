@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.log import FlightLog
-from harness.metric import Signals
+from harness.log.metric import Signals
 from harness.plants.plant import Outcome
 from harness.review.styled import Colour
 

@@ -8,7 +8,7 @@ from functools import cache
 from harness.feasibility import feasibility_line, warnings
 from harness.key import PHYSICS_VERSION, flight_key
 from harness.log import FlightLog
-from harness.metric import METRICS, measure
+from harness.log.metric import METRICS, measure
 from harness.provenance import packages
 from harness.review.styled import StyledFlight
 from harness.settings import document

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from harness.metric import METRICS, Value, window_in_words
+from harness.log.metric import METRICS, Value, window_in_words
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.runs.recordings import recording_path

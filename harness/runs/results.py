@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.files import replacing
-from harness.metric import METRICS, YES_OR_NO
+from harness.log.metric import METRICS, YES_OR_NO
 from harness.runs.store import reading
 from harness.settings.columns import by_column, is_setting
 

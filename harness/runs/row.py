@@ -9,8 +9,8 @@ from harness.feasibility import feasibility_margin
 from harness.flight import Flight
 from harness.key import Identity, identity
 from harness.log import COLUMNS, FlightLog
+from harness.log.metric import METRICS, measure
 from harness.loop import simulate
-from harness.metric import METRICS, measure
 from harness.plants.plant import Outcome, PlantError
 
 FlightRow = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from harness.metric import METRICS, YES_OR_NO
+from harness.log.metric import METRICS, YES_OR_NO
 from harness.runs.matrix import Matrix
 from harness.runs.store import reading
 from harness.settings.columns import by_column

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from harness.metric import METRICS, YES_OR_NO
+from harness.log.metric import METRICS, YES_OR_NO
 from harness.tables import number, table
 from harness.verdict.comparison import Comparison, Scorecard
 from harness.verdict.conditions import Conclusion

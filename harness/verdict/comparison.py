@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from harness.log.metric import METRICS
 from harness.margins import Assess
-from harness.metric import METRICS
 from harness.plants.ladder import BASELINE
 from harness.verdict.conditions import Conclusion, conclude
 from harness.verdict.following import with_following

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from harness.metric import METRICS
+from harness.log.metric import METRICS
 from harness.verdict.answer import place, plain, signed
 from harness.verdict.comparison import Scorecard
 from harness.verdict.effects import Ladder

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.error import HarnessError
-from harness.metric import METRICS
+from harness.log.metric import METRICS
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting

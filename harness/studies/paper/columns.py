@@ -14,8 +14,8 @@ from autopilot.laws import LAWS as KINDS
 from autopilot.nftsm import Nftsm
 from autopilot.smc import Smc
 from harness.flight import Flight
+from harness.log.metric import measure
 from harness.loop import simulate
-from harness.metric import measure
 from harness.plants.turn import bank_of_turn, rate_of_turn
 from harness.studies.paper.experiments import EKF, LAWS, Reading, Trace, ending, flight, flown
 

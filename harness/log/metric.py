@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import aircraft
 from harness.chatter import Oscillation, oscillation
 from harness.feasibility import feasibility_margin
-from harness.log import FlightLog
+from harness.log.flight_log import FlightLog
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.plants.turn import bank_of_turn, rate_of_turn

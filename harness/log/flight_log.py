@@ -109,7 +109,7 @@ class FlightLog:
     @property
     def metrics(self) -> dict[str, float | bool | None]:
         """All metrics by name, units by suffix; None where the plant has no such thing, or the flight shows none."""
-        from harness.metric import measure
+        from harness.log.metric import measure
 
         return measure(self)
 
@@ -131,6 +131,6 @@ class FlightLog:
 
         >>> log.plot().savefig("flight.png")
         """
-        from harness.figure import picture
+        from harness.log.figure import picture
 
         return picture((self, *others))
