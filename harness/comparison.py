@@ -9,6 +9,7 @@ from harness.error import did_you_mean
 from harness.log.metric import METRICS
 from harness.margins import Assess
 from harness.runs.comparable import flights_and_margins
+from harness.runs.results import as_results
 from harness.runs.store import last_run
 from harness.verdict.comparison import Comparison, compare_flights
 from harness.verdict.pairs import CompareError, settings_of
@@ -26,7 +27,7 @@ def compare(
 ) -> Comparison:
     """Pairs the flights that differ in the setting `by` alone, and says how their metrics differ.
 
-    - `results`: a directory of `run`, or a DataFrame as `load_results` gives it.
+    - `results`: a directory of `run`, or a DataFrame as `load_results` or `pd.read_parquet` gives it.
     - `by`: the setting, a column of the results; single gains change with a law or its set, nothing else does.
     - `baseline`: its value that the others are compared with; None is the kinematic plant, or the first value.
     - `where`: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
@@ -63,7 +64,7 @@ def _checked(results: pd.DataFrame) -> pd.DataFrame:
             f"the table has no column {', '.join(missing)}: it must be as harness.load_results gives it, "
             f"and has {', '.join(map(str, results.columns)) or 'none'}"
         )
-    return results.drop_duplicates("key").reset_index(drop=True)
+    return as_results(results.drop_duplicates("key").reset_index(drop=True))
 
 
 def _chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
@@ -87,4 +88,6 @@ def _chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
 
 
 def _unknown(what: str, key: str, known: Sequence[str]) -> str:
-    return f"{what}: no setting is called {key!r}{did_you_mean(key, known)}; the settings are {', '.join(known)}"
+    ending = [name for name in known if name.rpartition(".")[2].startswith(key)]
+    hint = f" - did you mean {ending[0]!r}?" if ending else did_you_mean(key, known)
+    return f"{what}: no setting is called {key!r}{hint}; the settings are {', '.join(known)}"

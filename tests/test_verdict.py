@@ -68,7 +68,7 @@ def test_a_flight_without_partner_and_a_failed_one_are_listed_with_what_they_are
         (results([result("sixdof")]), "1 flight in all: a comparison takes at least two"),
         (
             results([result("sixdof", 0), result("sixdof", 1)]),
-            "no flight has the baseline, plant = kinematic: there is",
+            "all 2 flights have plant = sixdof: add another value to the matrix, or compare another setting: --by",
         ),
         (results([result("kinematic", 0), result("kinematic", 1)]), "all 2 flights have plant = kinematic"),
         (
@@ -199,7 +199,7 @@ def test_holm_makes_a_lonely_test_harder_in_company() -> None:
     many = shifted(shifted(many, "range_error_rms_m", 1.4, scatter=0.3), "sideslip_rms_deg", 1.9, scatter=0.4)
     word = card_of(many).of("range_error_rms_m")[0]
     assert word.word == Verdict.UNDECIDED
-    assert "decided on its own, not among" in word.why
+    assert "shown as the only test, not as one of" in word.why
 
 
 def test_without_a_margin_a_difference_is_lower_or_higher_where_its_interval_excludes_zero() -> None:

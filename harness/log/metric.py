@@ -284,7 +284,7 @@ _METRICS = (
     Metric(
         name="convergence_time_half_tolerance_s",
         unit="s",
-        meaning="the same for half the tolerance: a comparison of times that it turns round rests on the tolerance",
+        meaning="convergence time at half the tolerance; a difference that changes sign with it rests on the tolerance",
         measure=lambda signals: signals.settling_time(0.5),
         heading="convergence time",
         statistic="at half the tolerance",
@@ -387,11 +387,10 @@ _METRICS = (
     Metric(
         name="chatters",
         unit=YES_OR_NO,
-        meaning="whether law and aircraft are in a limit cycle while circling is judged; null when gusts may hide one",
+        meaning="whether a limit cycle shows; null where gusts may hide one, or where the judged time is below 30 s",
         measure=lambda signals: signals.oscillation.chatters if signals.oscillation else None,
         heading="limit cycle",
         of_circling=True,
-        compared=False,
     ),
     Metric(
         name="limit_cycle_hz",
@@ -400,7 +399,6 @@ _METRICS = (
         measure=lambda signals: signals.limit_cycle.frequency if signals.limit_cycle else None,
         heading="limit cycle",
         of_circling=True,
-        compared=False,
     ),
     Metric(
         name="limit_cycle_amplitude_deg_s",
@@ -410,7 +408,6 @@ _METRICS = (
         heading="limit cycle",
         statistic="amplitude",
         of_circling=True,
-        compared=False,
     ),
     Metric(
         name="heading_rate_error_rms_deg_s",

@@ -41,7 +41,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         table = _exported(folder / PARQUET, _stand(journal))
         if table is None:
             table = _table(journal)
-    return _frame(_declared(table))
+    return as_results(_declared(table).to_pandas())
 
 
 def export(folder: Path) -> None:
@@ -136,18 +136,19 @@ def _flat(row: tuple[Any, ...]) -> dict[str, Any]:
     return columns
 
 
-def _frame(table: "pa.Table") -> "pd.DataFrame":
+def as_results(table: "pd.DataFrame") -> "pd.DataFrame":
+    """A table as pandas reads it from flights.parquet, with the types of `load_results`."""
+    import numpy as np
     import pandas as pd
-    import pyarrow as pa
 
-    frame: pd.DataFrame = table.to_pandas()
-    for field in table.schema:
-        if pa.types.is_list(field.type):
-            tuples = [None if value is None else tuple(value.tolist()) for value in frame[field.name]]
-            frame[field.name] = pd.Series(tuples, index=frame.index, dtype=object)
-        elif field.name in METRICS and pa.types.is_boolean(field.type):
-            frame[field.name] = frame[field.name].astype("boolean")
-    return frame
+    typed = {}
+    for name, column in table.items():
+        if column.dtype == object and column.map(lambda value: isinstance(value, np.ndarray)).any():
+            tuples = [tuple(value.tolist()) if isinstance(value, np.ndarray) else None for value in column]
+            typed[name] = pd.Series(tuples, index=table.index, dtype=object)
+        elif name in METRICS and METRICS[str(name)].unit == YES_OR_NO:
+            typed[name] = column.astype("boolean")
+    return table.assign(**{str(name): column for name, column in typed.items()})
 
 
 def mixed_versions(folder: Path) -> list[str]:

@@ -108,10 +108,14 @@ def _clauses(card: Scorecard, at: Mapping[str, object], others: list[float]) -> 
     """How much later the law converges than on the kinematic aircraft, and by how much more it errs on the circle."""
     cell = {j.column: j for j in card.judgements if dict(j.at) == at and j.pairs}
     if (time := cell.get("convergence_time_s")) is not None:
-        when = "later" if time.difference > 0 else "sooner"
-        low, high = sorted((abs(time.low), abs(time.high))) if time.low * time.high > 0 else (math.nan, math.nan)
-        between = "" if math.isnan(low) or low == high else f" [{plain(low)}, {plain(high)}]"
-        text = f"{plain(abs(time.difference))}{between} s {when} (n = {time.pairs})"
+        low, high = time.low, time.high
+        if low < 0.0 < high:
+            text = f"not shown to converge later or sooner ({number(time)}, n = {time.pairs})"
+        else:
+            when = "later" if time.difference > 0 else "sooner"
+            least, most = sorted((abs(low), abs(high)))
+            between = f" [{plain(least)}, {plain(most)}]" if low < high else ""
+            text = f"{plain(abs(time.difference))}{between} s {when} (n = {time.pairs})"
         if any(other * time.difference < 0 for other in others):
             told = ", ".join(f"{signed(other)} s" for other in others)
             text += f", a sign that changes with the tolerance ({told} at half and at twice of it)"

@@ -47,11 +47,26 @@ def scorecard(card: Scorecard, comparison: Comparison) -> Iterator[str]:
     yield from (f"  {remark}" for remark in remarks)
 
 
+def summary(card: Scorecard) -> Iterator[str]:
+    """A line for each group of parts: which hold, hold under a condition, fail, are undecided."""
+    for group in Group:
+        by_word: dict[Verdict, list[str]] = {}
+        for part in card.parts:
+            if part.group is group:
+                by_word.setdefault(card.conclusion(part.column).word, []).append(part.title)
+        if by_word:
+            yield f"{group}: " + "; ".join(f"{word}: {', '.join(by_word[word])}" for word in Verdict if word in by_word)
+
+
 def _row(card: Scorecard, part: Part) -> tuple[str, ...]:
     conclusion, of = card.conclusion(part.column), worst(card, part)
-    counts = "" if conclusion.of == 1 else f" {conclusion.holds}/{conclusion.of}"
-    if conclusion.fails and conclusion.of > 1:
-        counts += f", fails {conclusion.fails}"
+    known = [
+        f"holds in {conclusion.holds}" if conclusion.holds else "",
+        f"fails in {conclusion.fails}" if conclusion.fails else "",
+    ]
+    counts = "" if conclusion.of == 1 else f" ({', '.join(filter(None, known)) or 'shown in none'} of {conclusion.of})"
+    if conclusion.word in (Verdict.HOLDS, Verdict.FAILS) and max(conclusion.holds, conclusion.fails) == conclusion.of:
+        counts = "" if conclusion.of == 1 else f" in all {conclusion.of}"
     same = len({(j.difference, j.bounds) for j in card.of(part.column)}) == 1
     return f"  {part.title}", f"{conclusion.word}{counts}", value(of), bound(of, part), "" if same else place(of.at)
 
@@ -121,7 +136,9 @@ def worded(conclusion: Conclusion) -> str:
             return f"fails if {conclusion.condition.text}, holds in {conclusion.holds} of {of}"
     if conclusion.of == 1:
         return "fails"
-    text = f"fails in {conclusion.fails} of {of}, holds in {conclusion.holds}"
+    if conclusion.fails == conclusion.of:
+        return f"fails in all {of}"
+    text = f"fails in {conclusion.fails} of {of}" + (f", holds in {conclusion.holds}" if conclusion.holds else "")
     if conclusion.confounded:
         text += f"; {' and '.join(conclusion.confounded)} vary together: the design cannot tell which matters"
     return text
@@ -135,7 +152,13 @@ def changes(card: Scorecard) -> Iterator[str]:
             part = PARTS[column]
             of = worst(card, part)
             where = f", at {place(of.at)}" if place(of.at) and len(judgements) > 1 else ""
-            yield f"{part.title} {worded(card.conclusion(column))} ({value(of)}, {bound(of, part)} asked{where})."
+            differing = sum(j.word == Verdict.FAILS for j in judgements)
+            same = sum(j.word == Verdict.HOLDS for j in judgements)
+            margin = bound(of, part).removeprefix("within ")
+            yield (
+                f"{part.title}: differs by more than its margin in {differing}, by less in {same} of "
+                f"{counted(len(judgements), 'cell')} ({value(of)}, margin {margin}{where})."
+            )
             continue
         higher, lower = (sum(j.word == word for j in judgements) for word in (HIGHER, LOWER))
         if higher or lower:
@@ -143,7 +166,8 @@ def changes(card: Scorecard) -> Iterator[str]:
             where = f", at {place(largest.at)}" if place(largest.at) and len(judgements) > 1 else ""
             counts = f"lower in {lower}, higher in {higher} of {counted(len(judgements), 'cell')}"
             said = (HIGHER if higher else LOWER) if len(judgements) == 1 else counts
-            yield f"{column}: {said} ({value(largest)}{where})."
+            if plain(largest.difference) != "0":
+                yield f"{column}: {said} ({value(largest)}{where})."
 
 
 def place(at: Mapping[str, object]) -> str:
@@ -194,7 +218,7 @@ def signed(value: float) -> str:
 
 def interval(low: float, high: float) -> str:
     """A 95 % interval; nothing where it has no width or there is none."""
-    return "" if math.isnan(low) or low == high else f" [{signed(low)}, {signed(high)}]"
+    return "" if math.isnan(low) or signed(low) == signed(high) else f" [{signed(low)}, {signed(high)}]"
 
 
 def value(judgement: Judgement) -> str:

@@ -33,8 +33,9 @@ def intervals(figure: Figure, card: Scorecard, parts: Sequence[Part]) -> None:
         low, high = judgements[0].bounds
         if not part.relative:
             left, right = axes.get_xlim()
-            axes.axvspan(low if low is not None else min(left, high or left), high if high is not None else
-                         max(right, low or right), color=BAND, lw=0, zorder=0)  # fmt: skip
+            least, most = min(left, 0.0, low or 0.0), max(right, 0.0, high or 0.0)
+            axes.axvspan(least if low is None else low, most if high is None else high, color=BAND, lw=0, zorder=0)
+            axes.set_xlim(least, most)
         axes.axvline(0.0, color=GREY, lw=0.6)
         names = [place(judgement.at) for judgement in judgements[::-1]]
         axes.set_yticks(range(len(judgements)), names if axes is panels[0] else [""] * len(names), fontsize=6)

@@ -118,7 +118,10 @@ def _tested(
         if first or second:
             barred = f"in {first} pairs only the reference converges, in {second} only the other"
     judgement = _judgement(part.column, pairs, cell, value, of, differences, bounds)
-    return _Tested(judgement, of, evidence(of, lows, highs), barred)
+    shown = evidence(of, lows, highs)
+    if part.is_share and high is not None and of.drawn and of.seeds and bool(np.all(of.means == 1.0)):
+        shown = Evidence(1.0, min(1.0, 2.0 * high**of.seeds))  # binomial: every seed has it, where a share may at most
+    return _Tested(judgement, of, shown, barred)
 
 
 def _by_seed(reference: Array, differences: Array, seeds: NDArray[np.generic]) -> Array:
@@ -159,7 +162,7 @@ def _judgement(
 def _decided(tested: Sequence[_Tested], margins: Mapping[str, float]) -> Iterator[Judgement]:
     """The words, with Holm's adjustment over the family."""
     significance = margins["significance"]
-    chance = [each.sample.is_judged and not each.sample.is_exact for each in tested]  # it can err
+    chance = [0.0 < each.evidence.strongest < 1.0 for each in tested]  # it can err
     family = sum(chance)
     adjusted = iter(holm([each.evidence.strongest for each, errs in zip(tested, chance, strict=True) if errs]))
     for each, errs in zip(tested, chance, strict=True):
@@ -174,7 +177,7 @@ def _decided(tested: Sequence[_Tested], margins: Mapping[str, float]) -> Iterato
             why = why or (
                 "the interval crosses the margin"
                 if each.evidence.strongest > significance
-                else f"decided on its own, not among {family} tests"
+                else f"shown as the only test, not as one of this airframe's {family}"
             )
         yield replace(each.judgement, why=why, seeds_needed=needed)
 

@@ -113,14 +113,15 @@ def pairs_by(flights: pd.DataFrame, key: str, baseline: object) -> Pairs:
     if len(flights) < 2:
         raise CompareError(f"{len(flights)} flight in all: a comparison takes at least two that differ in {key}")
     values = ordered(flights[key])
+    others = [column for column in varying(flights) if column not in (key, "seed")]
+    instead = f", or compare another setting: --by {others[0]}" if others else ""
+    if len(values) == 1:
+        only = f"all {len(flights)} flights have {key} = {shown(values[0])}"
+        raise CompareError(f"{only}: add another value to the matrix{instead}")
     if not any(_same(baseline, value) for value in values):
         raise CompareError(
             f"no flight has the baseline, {key} = {shown(baseline)}: there is {', '.join(map(shown, values))}. "
-            "Add it to the matrix, or name another with --baseline"
-        )
-    if len(values) == 1:
-        raise CompareError(
-            f"all {len(flights)} flights have {key} = {shown(values[0])}: add another value to the matrix"
+            f"Add it to the matrix, or name another with --baseline{instead}"
         )
     judged = flights[~flights["outcome"].isin(FAILED)]
     is_reference = judged[key].map(lambda value: _same(value, baseline)).astype(bool)

@@ -19,6 +19,7 @@ from harness.vocabulary import SIGNS
 MOST_FLIGHTS = 60  # pairs listed
 MOST_LADDERS = 12  # drawn: the page stays below 3 MB
 MOST_DISTURBED = 200  # rows
+ROUNDING = 1e-6  # of any metric: nothing is drawn on an axis of rounding noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,8 @@ def _ladders(comparison: Comparison) -> Iterator[Drawing]:
     """The waterfall of every undisturbed cell, as far as the page has room."""
     by_cell: dict[str, list[Ladder]] = {}
     for ladder in ladders(comparison.table):
-        by_cell.setdefault(f"{ladder.aircraft} {dict(ladder.at)}", []).append(ladder)
+        if max(abs(ladder.start), abs(ladder.end), *(abs(step.of.mean) for step in ladder.steps)) > ROUNDING:
+            by_cell.setdefault(f"{ladder.aircraft} {dict(ladder.at)}", []).append(ladder)
     for cell in list(by_cell.values())[:MOST_LADDERS]:
         first = cell[0]
         where = answer.place(first.at)
