@@ -103,3 +103,25 @@ def test_a_time_whose_sign_rests_on_the_tolerance_says_so(comparison: Comparison
     assert len(smc) == 3
     for text in smc:
         assert "not shown to converge later or sooner" in text or "a sign that changes with the tolerance" in text
+
+
+def test_a_difference_of_convergence_times_is_of_pairs_that_both_converge(comparison: Comparison) -> None:
+    """It was said to be +46 s: mostly the 150 s at which flights were cut off."""
+    both = comparison.pairs.reference["converged"].astype(bool) & comparison.pairs.other["converged"].astype(bool)
+    times = comparison.differences.query("metric == 'convergence_time_s'")
+    assert times["pairs"].sum() == both.sum()
+    assert times["difference"].max() < 150.0 / 2.0
+
+
+def test_the_margin_to_the_limit_cycle_is_judged_once_and_no_lag_beside_it(comparison: Comparison) -> None:
+    """Gain, lag and lag x k2 were one fact, counted three times; none of them could come out otherwise."""
+    judged = {judgement.column for judgement in comparison.scorecards[0].judgements if judgement.has_margin}
+    assert "limit_cycle_margin" in judged
+    assert judged.isdisjoint({"heading_rate_lag_s", "heading_rate_gain", "lag_times_k2"})
+
+
+def test_a_condition_names_flown_values_and_no_half_line(comparison: Comparison) -> None:
+    """It was said: holds if guidance_period_s >= 0.2, the largest value that was flown."""
+    texts = list(comparison.conditions["condition"])
+    assert any(texts)
+    assert not [text for text in texts if "≥" in text or "≤" in text or ">" in text or "<" in text]

@@ -2,7 +2,7 @@
 
 A condition is a stretch of flown values of one axis, or of two. It is named only where
 
-- every decided cell within it has the word, and
+- every decided cell within it has the word, and the mean of every undecided one lies on that side of its margin, and
 - for each of its axes there are two cells alike in everything else, one within that has the word and one outside that
   has the opposite word.
 
@@ -29,7 +29,6 @@ class Condition:
     values: Mapping[str, Values]  # axis -> flown values
     text: str
     cells: int  # within it that have the word
-    undecided: int  # within it
 
     def covers(self, at: Mapping[str, object]) -> bool:
         return all(at[axis] in values for axis, values in self.values.items())
@@ -103,17 +102,22 @@ def _proved(
 ) -> Condition | None:
     opposite = Verdict.FAILS if word == Verdict.HOLDS else Verdict.HOLDS
     inside = [cell for cell in cells if all(cell.at[axis] in some for axis, some in values.items())]
-    if any(cell.word == opposite for cell in inside):
-        return None
     having = [cell for cell in inside if cell.word == word]
-    if not having:
+    if not having or not all(_agrees(cell, word) for cell in inside):
         return None
     outside = [cell for cell in cells if cell.word == opposite]
     for axis, some in values.items():
         if not any(_matched(a, b, axis) and b.at[axis] not in some for a in having for b in outside):
             return None
     text = " and ".join(_text(axis, some, across[axis]) for axis, some in values.items())
-    return Condition(word, values, text, len(having), sum(cell.word == Verdict.UNDECIDED for cell in inside))
+    return Condition(word, values, text, len(having))
+
+
+def _agrees(cell: Judgement, word: Verdict) -> bool:
+    """Whether the cell has the word, or is undecided with a mean on that side of its margin."""
+    if cell.word == Verdict.UNDECIDED:
+        return (cell.use <= 1.0) is (word == Verdict.HOLDS)
+    return cell.word == word
 
 
 def _matched(first: Judgement, second: Judgement, axis: str) -> bool:
