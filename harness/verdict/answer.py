@@ -76,7 +76,9 @@ def notes_on(card: Scorecard, part: Part) -> Iterator[str]:
     conclusion = card.conclusion(part.column)
     if conclusion.condition:
         word = "holds" if conclusion.condition.word is Verdict.HOLDS else "fails"
-        yield f"{part.title} {word} if {conclusion.condition.text} ({counted(conclusion.condition.cells, 'cell')})"
+        condition = conclusion.condition
+        having = "" if condition.cells == condition.of else f"{condition.cells} of "
+        yield f"{part.title} {word} if {condition.text} ({having}{counted(condition.of, 'cell')})"
     if conclusion.confounded:
         together = " and ".join(conclusion.confounded)
         yield f"{part.title}: {together} vary together, so the design cannot tell which matters"

@@ -29,6 +29,7 @@ class Condition:
     values: Mapping[str, Values]  # axis -> flown values
     text: str
     cells: int  # within it that have the word
+    of: int  # cells within it; the others are undecided
 
     def covers(self, at: Mapping[str, object]) -> bool:
         return all(at[axis] in values for axis, values in self.values.items())
@@ -110,7 +111,7 @@ def _proved(
         if not any(_matched(a, b, axis) and b.at[axis] not in some for a in having for b in outside):
             return None
     text = " and ".join(_text(axis, some, across[axis]) for axis, some in values.items())
-    return Condition(word, values, text, len(having))
+    return Condition(word, values, text, len(having), len(inside))
 
 
 def _agrees(cell: Judgement, word: Verdict) -> bool:
