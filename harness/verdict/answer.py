@@ -74,9 +74,8 @@ def _row(card: Scorecard, part: Part) -> tuple[str, ...]:
 def notes_on(card: Scorecard, part: Part) -> Iterator[str]:
     """Under what condition, what the design cannot tell apart, and why cells are undecided."""
     conclusion = card.conclusion(part.column)
-    if conclusion.condition:
-        word = "holds" if conclusion.condition.word is Verdict.HOLDS else "fails"
-        condition = conclusion.condition
+    if condition := conclusion.condition:
+        word = "holds" if condition.word is Verdict.HOLDS else "fails"
         having = "" if condition.cells == condition.of else f"{condition.cells} of "
         yield f"{part.title} {word} if {condition.text} ({having}{counted(condition.of, 'cell')})"
     if conclusion.confounded:
