@@ -49,7 +49,8 @@ notebook: install  ## execute docs/guide/notebook.ipynb anew: its outputs are wh
 verdict: install  ## fly the full matrix (half an hour on two processors), and write the answer
 	$(BIN)/harness run experiments/assumption.toml --out out/assumption --log none
 	$(BIN)/harness report out/assumption
-	$(BIN)/python -m harness.studies.does_it_hold out/assumption --readme README.md --rows tests/assumption_core.parquet
+	$(BIN)/harness run experiments/quiet_gains.toml --out out/quiet_gains --log none
+	$(BIN)/python -m harness.studies.does_it_hold out/assumption out/quiet_gains --readme README.md --rows tests
 
 bench: install  ## the speed of the loop, as ratios in one run, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed

@@ -7,10 +7,14 @@ from harness.margins import Assess
 from harness.runs.results import as_results
 from harness.studies.does_it_hold import (
     PAPERS_LIMIT,
+    Gains,
     compared,
     core,
     followed,
     matrix,
+    number,
+    quieter,
+    remedy,
     short_answer,
     still_air,
 )
@@ -18,12 +22,18 @@ from harness.verdict.answer import plain
 from harness.verdict.comparison import Comparison
 from tests.builders import DOCS, ROOT
 
-ROWS = ROOT / "tests" / "assumption_core.parquet"
+CORE = ROOT / "tests" / "assumption_core.parquet"
+QUIET_GAINS = ROOT / "tests" / "quiet_gains.parquet"
 
 
 @pytest.fixture(scope="module")
 def comparison() -> Comparison:
-    return compared(core(as_results(pd.read_parquet(ROWS))), Assess())
+    return compared(core(as_results(pd.read_parquet(CORE))), Assess())
+
+
+@pytest.fixture(scope="module")
+def gains() -> list[Gains]:
+    return list(quieter(compared(as_results(pd.read_parquet(QUIET_GAINS)), Assess())))
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +74,28 @@ def test_the_undisturbed_core_is_what_was_asked(comparison: Comparison) -> None:
     assert PAPERS_LIMIT in comparison.axes["law.max_heading_rate_deg_s"]
     assert set(comparison.table["wind.turbulence"]) == {"none"}
     assert len(comparison.pairs) == 3 * 5 * 3 * 20
+
+
+def test_what_would_make_it_hold_follows_from_the_flights(gains: list[Gains], page: str) -> None:
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert remedy(gains) in page
+    assert remedy(gains) in readme
+    assert len(gains) == 3 * 3  # airframes, pairs of gains
+    for each in gains:
+        time = number(each.costs["convergence_time_s"])
+        assert (
+            f"| {each.cycling} of {each.of} | {each.converged[0]}, {each.converged[1]} of {each.seeds} | {time} |"
+            in page
+        )
+
+
+def test_with_a_margin_of_one_and_a_half_no_flight_is_in_a_limit_cycle(gains: list[Gains]) -> None:
+    asked = Assess().limit_cycle_margin
+    with_margin = [each for each in gains if each.margin >= asked]
+    assert {each.aircraft for each in with_margin} == {each.aircraft for each in gains}
+    assert all(each.of == each.seeds for each in with_margin)
+    assert sum(each.cycling for each in with_margin) == 0
+    assert all(each.cycling == each.of for each in gains if each.margin < 1.0)
 
 
 # What was said before, and what the flights say

@@ -1,12 +1,12 @@
-"""Does coordinated flight hold? `python -m harness.studies.does_it_hold RUN` writes does_it_hold.md.
+"""Does coordinated flight hold? `python -m harness.studies.does_it_hold RUN GAINS` writes does_it_hold.md.
 
-RUN is the directory of `experiments/assumption.toml` (`make verdict`). Every statement names its condition, its numbers
-and its n, and the command that repeats it.
+RUN is the directory of `experiments/assumption.toml`, GAINS that of `experiments/quiet_gains.toml` (`make verdict`).
+Every statement names its condition, its numbers and its n, and the command that repeats it.
 """
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +17,7 @@ from harness.margins import Assess
 from harness.runs.comparable import flights_and_margins
 from harness.studies.command import out_option, run, write
 from harness.template import template
-from harness.verdict.answer import counted, interval, plain, signed, unit_of
+from harness.verdict.answer import interval, plain, signed, unit_of
 from harness.verdict.comparison import Comparison, Scorecard, compare_flights
 from harness.verdict.conditions import conclude
 from harness.verdict.effects import Disturbed, disturbances
@@ -221,6 +221,53 @@ def disturbed(flights: "pd.DataFrame", assess: Assess) -> list[Disturbed]:
     return list(disturbances(table[law & limited].reset_index(drop=True), PLANTS))
 
 
+class Gains(NamedTuple):
+    """What a pair of reaching gains of NFTSM does on an airframe, beside the kinematic aircraft."""
+
+    aircraft: str
+    k2: float  # 1/s
+    k3: float
+    margin: float  # to the limit cycle
+    cycling: int
+    of: int
+    converged: list[int]  # flights on each plant
+    seeds: int
+    costs: Mapping[str, Judgement]  # metric -> its difference, where it is known
+
+
+def quieter(comparison: Comparison) -> Iterator[Gains]:
+    """Of every airframe and pair of gains of `experiments/quiet_gains.toml`."""
+    table = comparison.table
+    for card in comparison.scorecards:
+        here = table[table["aircraft"] == card.aircraft]
+        for k2 in sorted(here["law.k2"].unique(), reverse=True):
+            flown = here[here["law.k2"] == k2]
+            aircraft = flown[flown["plant"] == PLANTS[1]]
+            costs = {j.column: j for j in card.judgements if j.at["law.k2"] == k2 and j.pairs}
+            converged = [int(flown.loc[flown["plant"] == plant, "converged"].sum()) for plant in PLANTS]
+            yield Gains(
+                card.aircraft, float(k2), float(flown["law.k3"].iloc[0]), float(aircraft["limit_cycle_margin"].iloc[0]),
+                int((aircraft["chatters"] == 1.0).sum()), int(aircraft["chatters"].notna().sum()),
+                converged, int(aircraft["seed"].nunique()), costs,
+            )  # fmt: skip
+
+
+def remedy(gains: Iterable[Gains]) -> str:
+    """What the smallest gains do on all airframes, in a sentence."""
+    of = list(gains)
+    least, most = min(each.k2 for each in of), max(each.k2 for each in of)
+    quiet = [each for each in of if each.k2 == least]
+    errors = [abs(end) for each in quiet for e in [each.costs["range_error_rms_m"]] for end in (e.low, e.high)]
+    times = [each.costs["convergence_time_s"].difference for each in quiet]
+    return (
+        f"k2 = {plain(least)} /s instead of {plain(most)} leaves "
+        f"{sum(each.cycling for each in quiet)} of {sum(each.of for each in quiet)} flights in a limit cycle, "
+        f"a settled error within {plain(max(errors))} m rms of the kinematic one, "
+        f"and a convergence {', '.join(map(plain, times))} s later "
+        f"({', '.join(each.aircraft for each in quiet)}; n = {quiet[0].seeds} each)."
+    )
+
+
 def _laws(card: Scorecard) -> list[str]:
     return list(dict.fromkeys(str(judgement.at["law"]) for judgement in card.judgements if "law" in judgement.at))
 
@@ -262,15 +309,20 @@ def short_answer(comparison: Comparison) -> Iterator[str]:
             if parts:
                 clauses.append(f"{word}: {', '.join(parts)}")
         n = next(card.seeds for card in comparison.scorecards if card.aircraft == aircraft)
-        yield f"{aircraft}: {'; '.join(clauses)}. The worst of three laws, {counted(n, 'seed')} each."
+        yield f"{aircraft}: {'; '.join(clauses)} (n = {n})."
 
 
-def page(flights: "pd.DataFrame", assess: Assess, folder: str) -> tuple[str, str]:
+def page(flights: "pd.DataFrame", gains: "pd.DataFrame", assess: Assess, folders: Sequence[str]) -> tuple[str, str]:
     """The page, and README's block."""
     quiet = core(flights)
     comparison = compared(quiet, assess)
+    pairs_of_gains = list(quieter(compared(gains, assess)))
     fields = {
-        "folder": folder,
+        "folder": folders[0],
+        "gains_folder": folders[1],
+        "gains": pairs_of_gains,
+        "remedy": remedy(pairs_of_gains),
+        "number": number,
         "limit": PAPERS_LIMIT,
         "law": MAIN_LAW,
         "quiet": QUIET,
@@ -297,32 +349,39 @@ def in_readme(readme: str, block: str) -> str:
     )
 
 
-def rows_kept(quiet: "pd.DataFrame") -> "pd.DataFrame":
-    """The undisturbed rows of both plants, without what the sentences do not need: the committed file of the tests."""
-    kept = quiet[quiet["plant"].isin(PLANTS)].drop(columns=["run", "version", "seconds"], errors="ignore")
+def rows_kept(flights: "pd.DataFrame") -> "pd.DataFrame":
+    """The rows of both plants, without what the sentences do not need: the committed files of the tests."""
+    kept = flights[flights["plant"].isin(PLANTS)].drop(columns=["run", "version", "seconds"], errors="ignore")
     constant = [c for c in kept.columns if c.startswith(("estimator.", "target.", "wind.", "inner_loop.", "metrics."))]
     needed = ("wind.steady_mps", "wind.turbulence", "estimator.kind")
     return with_following(kept.drop(columns=[c for c in constant if c not in needed])).reset_index(drop=True)
 
 
+def _folder() -> click.Path:
+    return click.Path(path_type=Path, exists=True, file_okay=False)
+
+
 @click.command()
-@click.argument("directory", metavar="RUN", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.argument("directory", metavar="RUN", type=_folder())
+@click.argument("gains", metavar="GAINS", type=_folder())
 @click.option("--readme", type=click.Path(path_type=Path, dir_okay=False), help="Write the answer here too.")
-@click.option("--rows", type=click.Path(path_type=Path, dir_okay=False), help="Keep the undisturbed rows here.")
+@click.option("--rows", type=_folder(), help="Keep the rows of the undisturbed flights and of GAINS in this folder.")
 @out_option
-def main(directory: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
-    """Write OUT/does_it_hold.md from the flights of RUN, the directory of experiments/assumption.toml."""
+def main(directory: Path, gains: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
+    """Write OUT/does_it_hold.md from the flights of experiments/assumption.toml and quiet_gains.toml."""
     flights, assess = flights_and_margins(directory)
-    text, block = page(flights, assess, str(directory))
+    of_gains, _ = flights_and_margins(gains)
+    text, block = page(flights, of_gains, assess, (str(directory), str(gains)))
     write(out, {"does_it_hold.md": text})
     if readme is not None:
         with replacing(readme) as partial:
             partial.write_text(in_readme(readme.read_text(encoding="utf-8"), block), encoding="utf-8")
         click.echo(readme)
     if rows is not None:
-        with replacing(rows) as partial:
-            rows_kept(core(flights)).to_parquet(partial, index=False)
-        click.echo(rows)
+        for name, table in (("assumption_core", core(flights)), ("quiet_gains", of_gains)):
+            with replacing(rows / f"{name}.parquet") as partial:
+                rows_kept(table).to_parquet(partial, index=False)
+            click.echo(rows / f"{name}.parquet")
 
 
 if __name__ == "__main__":
