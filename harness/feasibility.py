@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 import aircraft
 from autopilot.standoff import holding_course_rate
 from harness.flight import Flight, setup_of
@@ -25,12 +27,22 @@ def relative_speed(flight: Flight) -> float:
     return max(math.hypot(W_x - s.target_velocity_north, W_y - s.target_velocity_east) for s in target_states(flight))
 
 
+def is_outrun(flight: Flight) -> bool:
+    """Whether air and target move against each other as fast as the aircraft flies, or faster.
+
+    Nothing circles such a target: where the air comes from ahead, the aircraft does not get round.
+    """
+    return relative_speed(flight) >= flight.start.airspeed * (1.0 - 1e-9)  # less is rounding
+
+
 def needed_rate(flight: Flight) -> float:
-    """The largest rate needed to hold the circle, rad/s, of the quantity that the law limits.
+    """The largest rate needed to hold the circle, rad/s, of the quantity that the law limits; infinite if none does.
 
     The heading rate is (v_a + w)^2 / (v_a R_d), with w the relative speed. The course rate needed is smaller: with a
     target at rest it is (v_a + w) / R_d.
     """
+    if is_outrun(flight):
+        return math.inf
     v_a = flight.start.airspeed
     if flight.law.command == "course_rate":
         velocities = {(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight)}
@@ -39,12 +51,18 @@ def needed_rate(flight: Flight) -> float:
 
 
 def feasibility_margin(flight: Flight) -> float:
-    """The limit minus the rate needed to hold the circle, rad/s; negative if the circle cannot be held."""
-    return flight.law.max_heading_rate - needed_rate(flight)
+    """The limit minus the rate needed to hold the circle, rad/s; negative if the circle cannot be held.
+
+    Minus infinity where no rate holds it, even without a limit.
+    """
+    needed = needed_rate(flight)
+    return flight.law.max_heading_rate - needed if math.isfinite(needed) else -math.inf
 
 
 def feasibility_line(flight: Flight) -> str:
     """One line: whether the circle can be held, and by what margin."""
+    if is_outrun(flight):
+        return f"The circle is INFEASIBLE: {_outrun(flight)}."
     margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
     rate = flight.law.command.replace("_", " ")
     return (
@@ -64,8 +82,12 @@ def warnings(flight: Flight) -> list[str]:
         sentences.append(
             f"Remark 1 requires v_t + v_w < v_a; here v_t + v_w is {ratio * v_a:.3g} m/s and v_a is {v_a:g} m/s"
         )
-    if feasibility_margin(flight) < 0:
+    if is_outrun(flight):
+        sentences.append(f"the circle is infeasible: {_outrun(flight)}")
+    elif feasibility_margin(flight) < 0:
         sentences.append("the circle is infeasible: holding it takes more than the heading-rate limit")
+    if flight.wind.gusts and (gusty := _strongest_wind(flight)) >= v_a:
+        sentences.append(f"wind and gusts reach {gusty:.3g} m/s, the airspeed is {v_a:g} m/s")
     plant = PLANTS[flight.plant]
     setup = setup_of(flight)
     sentences += plant.warnings(setup)
@@ -81,3 +103,19 @@ def warnings(flight: Flight) -> list[str]:
                 f"{math.degrees(limits.bank):.0f} deg"
             )
     return sentences + flight.law.broken_conditions(ratio)
+
+
+def _outrun(flight: Flight) -> str:
+    return (
+        "it cannot be held at any heading rate, since air and target move against each other at up to "
+        f"{relative_speed(flight):.5g} m/s and the airspeed is {flight.start.airspeed:g} m/s"
+    )
+
+
+def _strongest_wind(flight: Flight) -> float:
+    """The largest speed of steady wind and discrete gusts together, m/s."""
+    wind = flight.wind
+    times = np.concatenate([[0.0], *(np.linspace(gust.from_, gust.to, 101) for gust in wind.gusts)])
+    times = times[times <= flight.duration]
+    velocity = wind.gust(times) + np.array([*wind.steady, 0.0])
+    return float(np.linalg.norm(velocity, axis=1).max())

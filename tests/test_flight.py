@@ -4,13 +4,14 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from autopilot.laws import law
 from harness.checks import problems
-from harness.feasibility import feasibility_margin, needed_rate, warnings
+from harness.feasibility import feasibility_line, feasibility_margin, needed_rate, warnings
 from harness.flight import Flight
 from harness.key import flight_key
 from harness.loop import simulate
@@ -18,7 +19,7 @@ from harness.plants.kinematic import Kinematic
 from harness.plants.plant import Start
 from harness.world.air import Air
 from harness.world.target import Segment, Target
-from harness.world.wind import Wind
+from harness.world.wind import Gust, Wind
 
 FLIGHT = Flight(plant="kinematic", law=law("smc", max_heading_rate=math.radians(5.0)))
 
@@ -85,6 +86,46 @@ def test_a_target_that_speeds_up_counts_at_its_fastest() -> None:
     assert feasibility_margin(replace(FLIGHT, target=fast)) == feasibility_margin(
         replace(FLIGHT, target=Target(speed=5.0))
     )
+
+
+@pytest.mark.parametrize("command", ["heading_rate", "course_rate"])
+@pytest.mark.parametrize("limit", [45.0, math.inf])
+@pytest.mark.parametrize(
+    ("wind", "target", "held"),
+    [
+        ((0.0, 0.0), Target(speed=12.9), True),
+        ((0.0, 0.0), Target(speed=13.0, heading=0.7), False),
+        ((0.0, 0.0), Target(speed=30.0), False),
+        ((-5.0, 0.0), Target(speed=8.0), False),
+        ((5.0, 0.0), Target(speed=17.0), True),  # the air takes the aircraft along
+        ((0.0, 0.0), Target(segments=(Segment(from_=10.0, to=40.0, acceleration=0.5),)), False),
+    ],
+)
+def test_a_target_as_fast_against_the_air_as_the_aircraft_is_circled_at_no_heading_rate(
+    command: Literal["heading_rate", "course_rate"],
+    limit: float,
+    wind: tuple[float, float],
+    target: Target,
+    held: bool,
+) -> None:
+    steering = law("nftsm", max_heading_rate=math.radians(limit), command=command)
+    flight = replace(FLIGHT, law=steering, wind=Wind(steady=wind), target=target)
+    assert (feasibility_margin(flight) == -math.inf) is not held
+    assert ("cannot be held at any heading rate" in feasibility_line(flight)) is not held
+    assert ("cannot be held at any heading rate" in " ".join(warnings(flight))) is not held
+
+
+@pytest.mark.parametrize(
+    ("velocity", "warned"),
+    [((12.9, 0.0, 0.0), False), ((13.1, 0.0, 0.0), True), ((0.0, -6.6, 0.0), False), ((0.0, 0.0, -13.0), True)],
+)
+def test_gusts_as_fast_as_the_aircraft_are_a_warning(velocity: tuple[float, float, float], warned: bool) -> None:
+    gusty = replace(FLIGHT, wind=Wind(gusts=(Gust(from_=10.0, to=20.0, velocity=velocity),)))
+    assert any("wind and gusts reach 13" in text for text in warnings(gusty)) is warned
+    late = replace(gusty, duration=10.0)
+    assert not any("gusts" in text for text in warnings(late))
+    twice = replace(gusty, wind=Wind(steady=(0.0, -1.0), gusts=gusty.wind.gusts * 2))
+    assert any("wind and gusts reach" in text for text in warnings(twice))
 
 
 def test_impossible_settings_are_named() -> None:

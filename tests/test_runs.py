@@ -9,6 +9,7 @@ import platform
 import shutil
 import sqlite3
 import subprocess
+import sys
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -33,6 +34,7 @@ from tests.builders import (
     copied_airframe,
     digests,
     fly_matrix,
+    invoke,
     result_matrix,
     words_of,
     write,
@@ -150,6 +152,26 @@ def test_results_are_one_row_per_flight_with_every_setting_and_metric(file: Path
     assert results["sideslip_peak_deg"].isna().tolist() == [True, False] * 5
     assert (results.groupby("seed")["start.heading_deg"].nunique() == 1).all()
     assert (results["seconds"] > 0).all()
+
+
+def test_that_no_heading_rate_holds_the_circle_is_kept_and_told_wherever_a_row_goes(tmp_path: Path) -> None:
+    settings = MATRIX.replace('"sixdof"', '"lagged"') + '"target.speed_mps" = [4.0, 13.0]\n'
+    out = tmp_path / "out"
+    fly_matrix(write(tmp_path / "matrix.toml", settings), out, "law.max_heading_rate_deg_s=45")
+    export(out)
+    for table in (harness.load_results(out), pd.read_parquet(out / PARQUET)):
+        margins = table.groupby("target.speed_mps")["feasibility_margin_deg_s"].agg(set)
+        assert margins[13.0] == {-math.inf}
+        assert margins[4.0] != {-math.inf}
+        assert min(margins[4.0]) > 0.0
+    key = harness.load_results(out).set_index("target.speed_mps")["key"].loc[13.0].iloc[0]
+    said = invoke("show", f"{out}:{key}").stdout
+    assert "INFEASIBLE, it cannot be held at any heading rate" in said
+    flown = json.loads(invoke("fly", f"{out}:{key}", "--json").stdout, parse_constant=pytest.fail)
+    assert flown["feasibility_margin_deg_s"] == -sys.float_info.max
+    compared = invoke("compare", out).stdout
+    assert "In 5 pairs the circle cannot be held at any heading rate" in compared
+    assert "the heading-rate limit is below" not in compared
 
 
 def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> None:

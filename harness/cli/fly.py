@@ -45,8 +45,6 @@ def fly(
       harness fly experiments/stationary.toml --live --pace 10
       harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0]
     """
-    import json
-
     from harness.cli._input import BadInput, flight_of, read_file, typed
     from harness.cli._paths import writable
     from harness.feasibility import feasibility_line, warnings
@@ -54,7 +52,7 @@ def fly(
     from harness.loop import simulate
     from harness.runs.description import metric_lines
     from harness.runs.recall import row_address
-    from harness.runs.row import result_of, row
+    from harness.runs.row import json_of, result_of, row
 
     if not live and (pace is not None or port is not None):
         raise BadInput("--pace and --port require --live")
@@ -85,7 +83,7 @@ def fly(
 
         write_recording(rrd, {flight.plant: log}, Path(what).stem, command=typed())
     if as_json:
-        click.echo(json.dumps(flight_row, allow_nan=False))
+        click.echo(json_of(flight_row))
     else:
         for line in metric_lines(flight_row["metrics"]):
             click.echo(line)

@@ -1,6 +1,7 @@
 """The description of a flight of a run: what was flown, how it ended, its metrics, and where it comes from."""
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -62,7 +63,12 @@ def _flight_lines(row: Mapping[str, Any], settings: Mapping[str, Any]) -> Iterat
     )
     margin = row["feasibility_margin_deg_s"]
     limit = f"{float(law['max_heading_rate_deg_s']):g} deg/s"
-    held = "" if margin is None else f": {'feasible' if margin >= 0 else 'INFEASIBLE'}, margin {margin:+.2f} deg/s"
+    if margin is None:
+        held = ""
+    elif margin == -math.inf:
+        held = ": INFEASIBLE, it cannot be held at any heading rate"
+    else:
+        held = f": {'feasible' if margin >= 0 else 'INFEASIBLE'}, margin {margin:+.2f} deg/s"
     yield f"circle of {law['standoff_m']:g} m with a heading-rate limit of {limit}{held}"
     reason = f": {row['reason']}" if row["reason"] else ""
     yield f"{Outcome(row['outcome']).sentence}{reason}."

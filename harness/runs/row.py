@@ -1,6 +1,8 @@
 """A flight as one row of results: printed by `fly --json`, kept by the store."""
 
+import json
 import math
+import sys
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +15,9 @@ from harness.log.metric import METRICS, measure
 from harness.loop import simulate
 from harness.plants.plant import Outcome, PlantError
 
-FlightRow = dict[str, Any]  # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s
+# key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s: none without a limit, -inf where no heading
+# rate holds the circle
+FlightRow = dict[str, Any]
 
 
 class FlightResult(NamedTuple):
@@ -28,7 +32,7 @@ class FlightResult(NamedTuple):
 
 
 def row_of(log: FlightLog) -> FlightRow:
-    """The row of a flown flight, fit for JSON; None for a metric that has no value."""
+    """The row of a flown flight; None for a metric that has no value."""
     return row(log.flight, identity(log.flight), result_of(log))
 
 
@@ -42,8 +46,15 @@ def row(flight: Flight, identity: Identity, result: FlightResult) -> FlightRow:
         "digest": result.digest,
         "flight": identity.settings,
         "metrics": result.metrics,
-        "feasibility_margin_deg_s": margin if math.isfinite(margin) else None,  # infinite without a heading-rate limit
+        "feasibility_margin_deg_s": margin if margin < math.inf else None,
     }
+
+
+def json_of(row: FlightRow) -> str:
+    """The row as JSON. That has no infinity: the largest number below zero stands for a margin of -inf."""
+    margin = row["feasibility_margin_deg_s"]
+    finite = None if margin is None else max(margin, -sys.float_info.max)
+    return json.dumps({**row, "feasibility_margin_deg_s": finite}, allow_nan=False)
 
 
 def result_of(log: FlightLog, seconds: float | None = None) -> FlightResult:

@@ -102,7 +102,13 @@ def compared(comparison: Comparison) -> Iterator[str]:
         f"{counted(len(comparison.pairs), 'pair')}, {counted(seeds, 'seed')}, from "
         f"{counted(comparison.flights, 'flight')}; varies: {varies or 'nothing else'}."
     )
-    infeasible = int((comparison.pairs.other["feasibility_margin_deg_s"] < 0.0).sum())
+    margin = comparison.pairs.other["feasibility_margin_deg_s"]
+    outrun, infeasible = int((margin == -math.inf).sum()), int(((margin < 0.0) & (margin > -math.inf)).sum())
+    if outrun:
+        yield (
+            f"In {counted(outrun, 'pair')} the circle cannot be held at any heading rate: air and target move against "
+            "each other as fast as the aircraft flies."
+        )
     if infeasible:
         yield f"In {counted(infeasible, 'pair')} the heading-rate limit is below what holding the circle takes."
     astray = int((~comparison.pairs.reference["circles"].astype(bool)).sum())

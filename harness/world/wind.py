@@ -49,13 +49,17 @@ class Wind:
     turbulence: Annotated[str, OneOf(tuple(SEVERITIES)), About("MIL-F-8785C, low altitude")] = "none"
     rotation: Annotated[bool, About("the turbulence also turns the air over a 6-DOF aircraft's wing")] = True
 
+    def gust(self, time: Array) -> Array:
+        """The sum of the discrete gusts at these times, s: shape (len(time), 3), m/s towards north, east, down."""
+        return sum((gust.at(time) for gust in self.gusts), np.zeros((len(time), 3)))
+
     def start(self, *, airspeed: float, altitude: float, step: float, duration: float, seed: int) -> Air:
         """The air of a flight at this nominal airspeed and altitude, on its grid of steps. SI."""
         if self == Wind(steady=self.steady, rotation=self.rotation):
             return Air(steady=self.steady)
         steps = round(duration / step)
         time = step * np.arange(steps + 1, dtype=np.float64)
-        gusts = sum((gust.at(time) for gust in self.gusts), np.zeros((len(time), 3)))
+        gusts = self.gust(time)
         air = Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)
         if self.turbulence == "none":
             return air
