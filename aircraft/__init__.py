@@ -1,6 +1,7 @@
 """The airframes: one folder each, with a JSBSim model and the data from which it was written."""
 
 import tomllib
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -65,29 +66,34 @@ def inner_loop(airframe: Path) -> dict[str, Any]:
 
 def limits(airframe: Path) -> Limits:
     """The limits of an airframe. Raises `AirframeError` when its files lack one."""
-    published, loop = airframe / "airframe.toml", airframe / "inner_loop.toml"
+    published, loop = _numbers(airframe / "airframe.toml"), _numbers(airframe / "inner_loop.toml")
     return Limits(
-        slowest=_number(published, "envelope", "V_min"),
-        design_airspeed=_number(published, "envelope", "V_design"),
-        fastest=_number(published, "envelope", "V_max"),
-        stall=_number(published, "aero", "alpha_stall"),
-        bank=_number(loop, "limit", "bank-rad"),
+        slowest=published("envelope", "V_min"),
+        design_airspeed=published("envelope", "V_design"),
+        fastest=published("envelope", "V_max"),
+        stall=published("aero", "alpha_stall"),
+        bank=loop("limit", "bank-rad"),
     )
 
 
-def _number(file: Path, *keys: str) -> float:
-    """The value `v` of an entry, given by its keys."""
-    value: Any = _read(file)
-    for key in (*keys, "v"):
-        value = value.get(key) if isinstance(value, dict) else None
-    if not isinstance(value, float | int):
-        raise AirframeError(f"{file}: {'.'.join(keys)}.v must be a number")
-    return float(value)
+def _numbers(file: Path) -> Callable[..., float]:
+    """A function that gives the value `v` of an entry of a file, by its keys."""
+    table = _read(file)
+
+    def number(*keys: str) -> float:
+        value: Any = table
+        for key in (*keys, "v"):
+            value = value.get(key) if isinstance(value, dict) else None
+        if not isinstance(value, float | int):
+            raise AirframeError(f"{file}: {'.'.join(keys)}.v must be a number")
+        return float(value)
+
+    return number
 
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return _parsed(file, file.stat().st_mtime_ns)
+        return _parsed(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise AirframeError(f"{file}: {error.strerror}") from None
     except ValueError as error:
@@ -95,5 +101,5 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=16)
-def _parsed(file: Path, modified: int) -> dict[str, Any]:
-    return tomllib.loads(file.read_text(encoding="utf-8"))
+def _parsed(text: str) -> dict[str, Any]:
+    return tomllib.loads(text)

@@ -50,9 +50,8 @@ def version_of(flight: Flight) -> Version:
         "turbulence": ("numpy", "scipy") if flight.wind.turbulence != "none" else (),
         "estimator": ESTIMATORS[flight.estimator.kind].libraries,
     }
-    paths = _paths(flight.plant, flight.aircraft, flight.target.track)
-    changed = tuple((name, path, path.stat().st_mtime_ns) for name, path in paths)
-    return _version(PHYSICS_VERSION, METRICS_VERSION, changed, tuple(libraries.items()))
+    content = {**_ON_BOARD, **_hashes(_read(flight))}
+    return _version(PHYSICS_VERSION, METRICS_VERSION, tuple(content.items()), tuple(libraries.items()))
 
 
 def flight_key(flight: Flight) -> str:
@@ -62,33 +61,28 @@ def flight_key(flight: Flight) -> str:
 
 def files(flight: Flight) -> dict[str, Path]:
     """The path of every file whose content decides the flight, by a name for its purpose, such as `target/track`."""
-    return dict(_paths(flight.plant, flight.aircraft, flight.target.track))
+    return {**_PYTHON, **_read(flight)}
 
 
-@lru_cache(maxsize=256)
-def _paths(plant: str, name: str, track: str | None) -> tuple[tuple[str, Path], ...]:
-    on_board = Path(autopilot.__file__).parent
-    paths = {f"autopilot/{path.name}": path for path in sorted(on_board.glob("*.py"))}
-    if track is not None:
-        paths["target/track"] = Path(track)
-    kind = PLANTS[plant]
-    if kind.has_airframe:
-        paths |= kind.files(aircraft.folder(name))
-    return tuple(paths.items())
+def _read(flight: Flight) -> dict[str, Path]:
+    """The files that are read anew for each flight."""
+    paths = {} if flight.target.track is None else {"target/track": Path(flight.target.track)}
+    kind = PLANTS[flight.plant]
+    return {**paths, **kind.files(aircraft.folder(flight.aircraft))} if kind.has_airframe else paths
 
 
 @lru_cache(maxsize=256)
 def _version(
     physics: int,
     metrics: int,
-    files: tuple[tuple[str, Path, int], ...],
+    content: tuple[tuple[str, str], ...],
     libraries: tuple[tuple[str, tuple[str, ...]], ...],
 ) -> Version:
-    """The version, from files as (name, path, modification time) and the libraries by purpose."""
+    """The version, from the hash of each file by its name, and the libraries by purpose."""
     decides = {
         "physics": physics,
         "metrics": metrics,
-        "content": {name: content_hash(path.read_bytes()) for name, path, _ in files},
+        "content": dict(content),
         **{purpose: {name: version(name) for name in names} or None for purpose, names in libraries},
     }
     return Version(hashed(decides), decides)
@@ -103,3 +97,12 @@ def hashed(content: object) -> str:
 def content_hash(content: bytes) -> str:
     """A hash, 32 hex digits, of the content of a file."""
     return hashlib.blake2b(content, digest_size=16).hexdigest()
+
+
+def _hashes(files: Mapping[str, Path]) -> dict[str, str]:
+    return {name: content_hash(path.read_bytes()) for name, path in files.items()}
+
+
+# The laws and estimators as imported: what this process flies, whatever the files are edited to later.
+_PYTHON = {f"autopilot/{path.name}": path for path in sorted(Path(autopilot.__file__).parent.glob("*.py"))}
+_ON_BOARD = _hashes(_PYTHON)

@@ -17,7 +17,7 @@ import pytest
 
 import harness
 from harness.runs.matrix import read_matrix
-from harness.runs.store import JOURNAL, StoreError, begun, reading
+from harness.runs.store import JOURNAL, StoreError, reading
 from harness.runs.wall_time import typical_wall_time
 from harness.runs.workers import Task, WorkerResult, fly_task
 from harness.settings import read_settings
@@ -77,7 +77,7 @@ def runs_of(out: Path) -> dict[str, int]:
     """Which run flew each flight that is kept."""
     try:
         with reading(out) as journal:
-            return dict(journal.execute("SELECT key, run FROM flights")) if begun(journal) else {}
+            return dict(journal.execute("SELECT key, run FROM flights"))
     except StoreError:
         return {}  # killed before there was a journal
 

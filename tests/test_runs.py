@@ -83,6 +83,51 @@ def test_a_run_is_told_kept_exported_and_not_flown_twice(file: Path, tmp_path: P
     pd.testing.assert_frame_equal(harness.load_results(out), results)
 
 
+def test_the_table_of_another_journal_is_not_read_for_this_ones(file: Path, tmp_path: Path) -> None:
+    out, copy = tmp_path / "out", tmp_path / "copy"
+    fly_matrix(file, out, "start.heading_deg=10.0")
+    export(out)
+    (out / JOURNAL).rename(tmp_path / "moved")
+    fly_matrix(file, out, "start.heading_deg=20.0")
+    assert set(harness.load_results(out)["start.heading_deg"]) == {20.0}
+    shutil.copytree(out, copy)  # from here on each goes its own way, with as many flights
+    for folder, heading in ((out, 30.0), (copy, 40.0)):
+        fly_matrix(file, folder, f"start.heading_deg={heading}")
+        export(folder)
+    shutil.copy(out / JOURNAL, copy / JOURNAL)
+    assert set(harness.load_results(copy)["start.heading_deg"]) == {20.0, 30.0}
+
+
+def test_a_journal_of_an_earlier_format_is_read_as_it_is_and_upgraded_by_the_next_run(
+    file: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    fly_matrix(file, out)
+    results = harness.load_results(out)
+    with contextlib.closing(sqlite3.connect(out / JOURNAL)) as journal:  # what format 1 had in place of the state
+        journal.executescript(
+            "DROP TABLE state; CREATE TABLE changes (number INTEGER NOT NULL); INSERT INTO changes VALUES (1); "
+            "PRAGMA user_version = 1;"
+        )
+    before = (out / JOURNAL).read_bytes()
+    pd.testing.assert_frame_equal(harness.load_results(out), results)
+    assert (out / JOURNAL).read_bytes() == before
+    assert fly_matrix(file, out).earlier == len(results)
+    pd.testing.assert_frame_equal(harness.load_results(out), results)
+
+
+def test_a_journal_of_a_later_format_is_refused_with_what_to_do(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    fly_matrix(file, out, "seed=0", "plant=kinematic")
+    with contextlib.closing(sqlite3.connect(out / JOURNAL)) as journal:
+        journal.execute("PRAGMA user_version = 99")
+    for words in (("run", file, "--out", out), ("show", out)):
+        done = command(*words)
+        assert done.returncode == 2
+        assert "has format 99, this harness reads formats 1 to " in done.stderr
+        assert "use the harness that wrote it, or another directory" in done.stderr
+
+
 def test_the_exported_table_says_of_each_column_what_it_is(file: Path, tmp_path: Path) -> None:
     fly_matrix(file, tmp_path / "out")
     export(tmp_path / "out")

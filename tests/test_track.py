@@ -1,6 +1,7 @@
 """A recorded track: the curve against closed forms, the file's mistakes, and a flight along it."""
 
 import math
+import os
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -193,6 +194,15 @@ def test_the_key_counts_a_tracks_content_not_its_place(circle: Path, tmp_path: P
     assert flight_key(replace(flight(circle), target=Target())) != key
     copy.write_text(copy.read_text().replace("100.0", "100.5"))
     assert flight_key(flight(copy)) != key
+
+
+def test_a_file_rewritten_within_the_clock_of_its_file_system_is_read_anew(circle: Path) -> None:
+    before, since = flight_key(flight(circle)), circle.stat()
+    there = load_track(circle).at(10.0)
+    circle.write_text(circle.read_text().replace("100.0", "200.0"))
+    os.utime(circle, ns=(since.st_atime_ns, since.st_mtime_ns))
+    assert load_track(circle).at(10.0) != there
+    assert flight_key(flight(circle)) != before
 
 
 def test_a_flight_along_a_track_logs_it_and_flies_alike_after_pickling(circle: Path) -> None:

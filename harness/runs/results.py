@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.files import replacing
 from harness.log.metric import METRICS, YES_OR_NO
-from harness.runs.store import reading
+from harness.runs.store import reading, state
 from harness.settings.columns import by_column, is_setting
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ PARQUET = "flights.parquet"
 _AT_ONCE = 1000  # rows
 _TEXTS = ("key", "outcome", "reason", "digest")
 _NUMBERS = ("feasibility_margin_deg_s", "seconds")
-_STAND = b"journal_changes"  # in the Parquet file's metadata: the state of the journal that was exported
+_STATE = b"journal_state"  # in the Parquet file's metadata: the `state` of the journal that was exported
 
 
 def load_results(folder: Path | str) -> "pd.DataFrame":
@@ -38,7 +38,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     """
     folder = Path(folder)
     with reading(folder) as journal:
-        table = _exported(folder / PARQUET, _stand(journal))
+        table = _exported(folder / PARQUET, state(journal))
         if table is None:
             table = _table(journal)
     return as_results(_declared(table).to_pandas())
@@ -50,37 +50,32 @@ def export(folder: Path) -> None:
 
     path = folder / PARQUET
     with reading(folder) as journal:
-        stand = _stand(journal)
-        if _is_current(path, stand):
+        now = state(journal)
+        if _is_current(path, now):
             return
-        table = _declared(_table(journal)).replace_schema_metadata({_STAND: stand})
+        table = _declared(_table(journal)).replace_schema_metadata({_STATE: now})
     with replacing(path) as partial:
         pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
 
 
-def _stand(journal: sqlite3.Connection) -> bytes:
-    ((number,),) = journal.execute("SELECT number FROM changes")
-    return str(number).encode()
-
-
-def _is_current(path: Path, stand: bytes) -> bool:
-    """Whether the exported table holds all flights of the journal."""
+def _is_current(path: Path, now: str) -> bool:
+    """Whether the table was exported from this journal with the flights that it has now."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        return (pq.read_schema(path).metadata or {}).get(_STAND) == stand
+        return (pq.read_schema(path).metadata or {}).get(_STATE) == now.encode()
     except (OSError, pa.ArrowException):
         return False  # missing or damaged: the journal holds everything
 
 
-def _exported(path: Path, stand: bytes) -> "pa.Table | None":
-    """The exported table; None if a flight was added since."""
+def _exported(path: Path, now: str) -> "pa.Table | None":
+    """The exported table; None if it is not current."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        return pq.read_table(path) if _is_current(path, stand) else None
+        return pq.read_table(path) if _is_current(path, now) else None
     except (OSError, pa.ArrowException):
         return None
 

@@ -10,7 +10,7 @@ from harness.plants.plant import Outcome
 from harness.provenance import provenance
 from harness.runs.matrix import Matrix
 from harness.runs.row import row
-from harness.runs.store import JOURNAL, Store, begun, examples, positions, reading
+from harness.runs.store import JOURNAL, Store, examples, positions, reading
 from harness.runs.wall_time import WallTime
 from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
@@ -80,7 +80,10 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
 def _keep(store: Store, done: Done, identity: Identity, progress: Progress) -> None:
     task, (result, version, problem) = done
     if version != task.version:
-        raise WorkersError("a law, an airframe or a track has changed during the run: run the same command again")
+        raise WorkersError(
+            "a law, an airframe or a track has changed during the run: run the same command again, in a notebook after "
+            "a restart of its kernel"
+        )
     if problem:
         progress.recordings.append(problem)
     store.add_version(identity.version, files(task.flight))
@@ -131,8 +134,6 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> froze
     if not (folder / JOURNAL).exists():
         return frozenset()
     with reading(folder) as journal:
-        if not begun(journal):
-            return frozenset()
         current = []
         for version, settings in examples(journal):
             try:

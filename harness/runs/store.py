@@ -6,7 +6,7 @@ import socket
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -20,7 +20,8 @@ from harness.runs.row import FlightResult, FlightRow
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
 COMMIT_EVERY = 0.5  # s: the longest time that a row waits to be committed
 _APPLICATION = 0x53544F46  # "STOF", SQLite's application id of the journal
-_FORMAT = 1
+_FORMAT = 2  # of the journal, in SQLite's user_version
+_RANDOM = "lower(hex(randomblob(16)))"
 _WAIT = 60.0  # s, for another process to let go of the journal
 
 _TABLES = f"""
@@ -37,11 +38,13 @@ CREATE INDEX flights_done ON flights (key, version, outcome);
 CREATE TABLE positions (
     matrix TEXT NOT NULL, position INTEGER NOT NULL, key TEXT NOT NULL, PRIMARY KEY (matrix, position)
 ) WITHOUT ROWID;
-CREATE TABLE changes (number INTEGER NOT NULL);
-INSERT INTO changes VALUES (0);
+CREATE TABLE state (id TEXT NOT NULL);
+INSERT INTO state VALUES ({_RANDOM});
 PRAGMA application_id = {_APPLICATION};
-PRAGMA user_version = {_FORMAT};
 """
+_UPGRADES = {  # by format, what makes the next one of it
+    1: f"DROP TABLE changes; CREATE TABLE state (id TEXT NOT NULL); INSERT INTO state VALUES ({_RANDOM});",
+}
 _FAILURES = tuple(outcome.value for outcome in Outcome if outcome.failed)
 _FAILED = f"outcome IN ({', '.join(repr(value) for value in _FAILURES)})"
 
@@ -75,12 +78,8 @@ class Store:
             raise StoreError(f"{folder}: cannot be written: {error.strerror or error}") from None
         try:
             with _store_errors(folder):
-                fresh = not (folder / JOURNAL).exists()
                 self._journal = sqlite3.connect(folder / JOURNAL, timeout=_WAIT, isolation_level=None)
-                if not fresh:
-                    _check(self._journal, folder, thorough=True)
-                if not begun(self._journal):
-                    self._journal.executescript(f"BEGIN; {_TABLES} COMMIT;")
+                _upgrade(self._journal, _format(self._journal, folder, thorough=True))
         except BaseException:
             os.close(self._lock)
             raise
@@ -155,7 +154,7 @@ class Store:
         if self._begun is not None:
             with _store_errors(self.folder):
                 if self._grown:
-                    self._journal.execute("UPDATE changes SET number = number + 1")
+                    self._journal.execute(f"UPDATE state SET id = {_RANDOM}")
                 self._journal.execute("COMMIT")
             self._begun, self._grown = None, False
 
@@ -179,7 +178,10 @@ class Store:
 
 @contextmanager
 def reading(folder: Path) -> Iterator[sqlite3.Connection]:
-    """The journal, open for reading, also while a run writes to it. Raises `StoreError`."""
+    """The journal, open for reading, also while a run writes to it; one of an earlier format as an upgraded copy.
+
+    Raises `StoreError`.
+    """
     path = folder / JOURNAL
     if not path.is_file():
         raise StoreError(f"{folder}: holds no results of `harness run` (there is no {JOURNAL})")
@@ -187,17 +189,19 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
         # Opened for writing where that is allowed: a run that was killed may have left half a commit to roll back.
         mode = "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
         journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=_WAIT)
-        try:
+        with closing(journal), closing(sqlite3.connect("")) as copy:
             journal.execute("PRAGMA query_only = ON")
-            _check(journal, folder, thorough=False)
-            yield journal
-        finally:
-            journal.close()
+            version = _format(journal, folder, thorough=False)
+            if version != _FORMAT:
+                journal.backup(copy)
+                _upgrade(copy, version)
+            yield journal if version == _FORMAT else copy
 
 
-def begun(journal: sqlite3.Connection) -> bool:
-    """Whether the journal has its tables: a run may have been killed before it made them."""
-    return bool(journal.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+def state(journal: sqlite3.Connection) -> str:
+    """A random text that is new whenever flights were added: equal exactly for one journal with the same flights."""
+    ((text,),) = journal.execute("SELECT id FROM state")
+    return str(text)
 
 
 def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
@@ -302,19 +306,34 @@ def _store_errors(folder: Path) -> Iterator[None]:
         raise StoreError(why) from None
 
 
-def _check(journal: sqlite3.Connection, folder: Path, *, thorough: bool) -> None:
-    """Raises `StoreError` for a file that is not a journal of this format or, when `thorough`, is damaged."""
+def _format(journal: sqlite3.Connection, folder: Path, *, thorough: bool) -> int:
+    """The format of the journal; 0 while it has no tables: a run may have been killed before it made them.
+
+    Raises `StoreError` for a file that is no journal, or of a later format or, when `thorough`, is damaged.
+    """
     ((application,),) = journal.execute("PRAGMA application_id")
     ((version,),) = journal.execute("PRAGMA user_version")
     path = folder / JOURNAL
-    if not application and not begun(journal):
-        return
+    if not journal.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        return 0
     if application != _APPLICATION:
         raise StoreError(f"{path}: is not a journal of the harness: nothing was changed; move it away")
-    if version != _FORMAT:
-        raise StoreError(f"{path}: has format {version}, this harness reads format {_FORMAT}: use another directory")
+    if not 1 <= version <= _FORMAT:
+        raise StoreError(
+            f"{path}: has format {version}, this harness reads formats 1 to {_FORMAT}: use the harness that wrote it, "
+            "or another directory"
+        )
     if thorough and (damage := journal.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
         raise StoreError(f"{path}: is damaged ({' '.join(damage.split())}): nothing was changed; move it away")
+    return int(version)
+
+
+def _upgrade(journal: sqlite3.Connection, version: int) -> None:
+    """Makes a journal of today's format of one of this format."""
+    if version == _FORMAT:
+        return
+    script = "".join(_UPGRADES[earlier] for earlier in range(version, _FORMAT)) if version else _TABLES
+    journal.executescript(f"BEGIN; {script} PRAGMA user_version = {_FORMAT}; COMMIT;")
 
 
 def _locked(path: Path) -> int:

@@ -61,7 +61,7 @@ class Track:
 def load_track(path: Path) -> Track:
     """The track in a file. Raises `TrackError`."""
     try:
-        return _load(path, path.stat().st_mtime_ns)
+        return _parsed(path, path.read_bytes())
     except TrackError:
         raise
     except OSError as error:
@@ -73,16 +73,17 @@ def load_track(path: Path) -> Track:
 
 
 @lru_cache(maxsize=16)
-def _load(path: Path, modified: int) -> Track:
+def _parsed(path: Path, content: bytes) -> Track:
+    """The track that the content of a file describes; `path` is for messages."""
     from scipy.interpolate import CubicSpline  # late: it takes a tenth of a second to import
 
-    times, norths, easts = zip(*_rows(path), strict=True)
+    times, norths, easts = zip(*_rows(path, content.decode("utf-8-sig")), strict=True)
     north, east = (CubicSpline(times, values).c.T.tolist() for values in (norths, easts))
     return Track([Cubic(*cubic) for cubic in zip(times[:-1], north, east, strict=True)], times[-1])
 
 
-def _rows(path: Path) -> list[_Row]:
-    lines = path.read_text(encoding="utf-8-sig").rstrip().split("\n")
+def _rows(path: Path, text: str) -> list[_Row]:
+    lines = text.rstrip().splitlines() or [""]
     header = tuple(cell.strip() for cell in lines[0].split(","))
     if header != HEADER:
         raise TrackError(f"{path}:1: the header is {lines[0].strip()[:60]!r}, must be {','.join(HEADER)!r}")
