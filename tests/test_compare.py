@@ -230,7 +230,7 @@ def test_a_browser_shows_all_of_the_page(page: Path, tmp_path: Path) -> None:
     done = opened(page, tmp_path)
     dom = done.stdout
     shown = re.findall(r'<section[^>]* id="(\w+)"', dom)
-    assert shown == ["answer", "parts", "scorecards", "ladder", "flights", "method"]
+    assert shown == ["answer", "flown", "parts", "scorecards", "ladder", "flights", "method"]
     assert dom.count("<svg") == 5  # a figure for each group of parts, and the waterfalls of two cells
     assert dom.count("harness view") == 2  # the worst and the middle one
     assert "Compared: plant = sixdof beside kinematic" in dom

@@ -16,10 +16,20 @@ from harness.vocabulary import Verdict
 
 def sentences(comparison: Comparison) -> Iterator[str]:
     """The answer: the question, what was compared, lost flights first, then each airframe."""
+    yield from opening(comparison)
+    yield from answers(comparison)
+
+
+def opening(comparison: Comparison) -> Iterator[str]:
+    """The question, what was compared, and the flights that were lost."""
     if comparison.question:
         yield comparison.question
     yield from compared(comparison)
     yield from lost(comparison)
+
+
+def answers(comparison: Comparison) -> Iterator[str]:
+    """Each airframe under the value furthest from the baseline."""
     for card in comparison.answering:
         yield ""
         yield from scorecard(card, comparison)

@@ -6,9 +6,11 @@ from functools import partial
 from typing import NamedTuple
 
 from harness.drawing import draw
+from harness.log.metric import METRICS
 from harness.settings.written import written
+from harness.tables import number
 from harness.template import template
-from harness.verdict import answer, figures
+from harness.verdict import answer, figures, flown, grid
 from harness.verdict.comparison import Comparison, Scorecard
 from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
 from harness.verdict.pairs import shown, spread
@@ -17,9 +19,10 @@ from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
 from harness.vocabulary import SIGNS
 
 MOST_FLIGHTS = 60  # pairs listed
+MOST_GRIDS = 16
+MOST_LINES = 200  # of what was flown
 MOST_LADDERS = 12  # drawn: the page stays below 3 MB
 MOST_DISTURBED = 200  # rows
-ROUNDING = 1e-6  # of any metric: nothing is drawn on an axis of rounding noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,13 @@ def page(comparison: Comparison, origin: Origin) -> str:
         words=answer,
         groups=[group for group in Group if any(part.group is group for part in judged_parts)],
         parts=judged_parts,
+        cycling=flown.cycling(comparison),
+        flown=flown.combinations(comparison),
+        told=[METRICS[name] for name in flown.TOLD],
+        number=number,
+        most_lines=MOST_LINES,
+        grids=[each for metric in grid.DEFAULT for each in grid.grids(comparison, metric)[::-1]][:MOST_GRIDS],
+        folder=origin.folder,
         axes={axis: answer.values(values) for axis, values in comparison.axes.items()},
         margins=written(comparison.assess),
         drawings=lambda card: list(_intervals(card)) if card in comparison.answering else [],
@@ -108,7 +118,7 @@ def _ladders(comparison: Comparison) -> Iterator[Drawing]:
     """The waterfall of every undisturbed cell, as far as the page has room."""
     by_cell: dict[str, list[Ladder]] = {}
     for ladder in ladders(comparison.table):
-        if max(abs(ladder.start), abs(ladder.end), *(abs(step.of.mean) for step in ladder.steps)) > ROUNDING:
+        if max(abs(ladder.start), abs(ladder.end), *(abs(step.of.mean) for step in ladder.steps)) > grid.ROUNDING:
             by_cell.setdefault(f"{ladder.aircraft} {dict(ladder.at)}", []).append(ladder)
     for cell in list(by_cell.values())[:MOST_LADDERS]:
         first = cell[0]

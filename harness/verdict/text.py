@@ -2,17 +2,28 @@
 
 from collections.abc import Iterator
 
-from harness.verdict.answer import counted, missing_flights, scorecard, sentences
+from harness.verdict import flown, grid
+from harness.verdict.answer import answers, counted, missing_flights, opening, scorecard
 from harness.verdict.comparison import Comparison, Unpaired
-from harness.verdict.pairs import shown
+from harness.verdict.pairs import CompareError, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
 
 MOST_LISTED = 10
 
 
-def lines(comparison: Comparison) -> Iterator[str]:
-    """All of it."""
-    yield from sentences(comparison)
+def lines(comparison: Comparison, mapped: str | None = None) -> Iterator[str]:
+    """All of it; with the name of a metric its maps alone."""
+    yield from opening(comparison)
+    if mapped is not None:
+        yield from grid.lines(_maps(comparison, mapped))
+        return
+    if told := flown.cycling(comparison):
+        yield told
+    yield ""
+    yield from flown.lines(comparison)
+    answering = [each for each in grid.grids(comparison, "chatters") if each.value == comparison.values[-1]]
+    yield from grid.lines(answering)
+    yield from answers(comparison)
     for card in comparison.others:
         yield ""
         yield from scorecard(card, comparison)
@@ -28,6 +39,16 @@ def lines(comparison: Comparison) -> Iterator[str]:
         f"agree count as a number from {LEAST_EQUAL} on. Words: two-sided tests at "
         f"{comparison.assess.significance:g}, Holm's adjustment over one airframe's parts and cells."
     )
+
+
+def _maps(comparison: Comparison, metric: str) -> list[grid.Grid]:
+    found = grid.grids(comparison, metric)
+    if not found:
+        raise CompareError(
+            f"--map {metric}: needs two numeric axes; beside {comparison.by} these vary: "
+            f"{', '.join(comparison.axes) or 'none'}"
+        )
+    return found[::-1]  # the value furthest from the baseline first
 
 
 def unpaired(flights: tuple[Unpaired, ...]) -> Iterator[str]:

@@ -1,0 +1,90 @@
+"""What was flown: how the flights of each combination of settings ended, and their metrics."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import pandas as pd
+
+from harness.log.metric import METRICS
+from harness.tables import number, table
+from harness.verdict.comparison import Comparison
+from harness.verdict.pairs import joined, ordered, shown, spread
+
+TOLD = ("convergence_time_s", "range_error_rms_m", "saturation_fraction", "sideslip_rms_deg")  # beside the counts
+MOST_LINES = 24
+
+
+class Shares(NamedTuple):
+    """Flights that have something, of those of which it is known."""
+
+    number: int
+    of: int
+
+    def __str__(self) -> str:
+        return f"{self.number} of {self.of}" if self.of else "-"
+
+
+class Combination(NamedTuple):
+    """Flights that differ only in the seed and in what is drawn from it."""
+
+    at: tuple[object, ...]  # the value of each axis
+    flights: int
+    lost: int
+    converged: int
+    cycling: Shares
+    medians: tuple[float | None, ...]  # of `TOLD`
+    keys: tuple[str, ...]
+
+
+def combinations(comparison: Comparison) -> tuple[list[str], list[Combination]]:
+    """The axes, what is compared among them, and every combination of their values that was flown, in order."""
+    flights = spread(comparison.table)
+    if comparison.by not in flights:
+        flights[comparison.by] = comparison.table[comparison.by]
+    axes = [*comparison.axes, comparison.by]
+    ranks = {axis: {shown(value): i for i, value in enumerate(ordered(flights[axis]))} for axis in axes}
+    groups = flights.groupby(joined(flights, axes), sort=False)
+    found = [_combination(tuple(rows[axis].iloc[0] for axis in axes), rows) for _, rows in groups]
+    found.sort(key=lambda each: [ranks[axis][shown(value)] for axis, value in zip(axes, each.at, strict=True)])
+    return axes, found
+
+
+def _combination(at: tuple[object, ...], rows: pd.DataFrame) -> Combination:
+    return Combination(
+        at, len(rows), int(rows["lost"].sum()), int(rows["converged"].sum()), _cycling(rows),
+        tuple(float(known.median()) if len(known := rows[name].dropna()) else None for name in TOLD),
+        tuple(rows["key"]),
+    )  # fmt: skip
+
+
+def _cycling(rows: pd.DataFrame) -> Shares:
+    return Shares(int(rows["chatters"].sum()), int(rows["chatters"].notna().sum()))
+
+
+def lines(comparison: Comparison) -> Iterator[str]:
+    """A line for each combination, of as many as a screen holds."""
+    axes, found = combinations(comparison)
+    metrics = [METRICS[name] for name in TOLD]
+    headings = [
+        *(axis.replace(".", ".\n") for axis in axes), "flights", "lost", "converge", "in a limit\ncycle",
+        *(metric.column_heading for metric in metrics),
+    ]  # fmt: skip
+    rows = [
+        [
+            *map(shown, each.at), str(each.flights), str(each.lost), str(each.converged), str(each.cycling),
+            *(number(value, metric.scale) for value, metric in zip(each.medians, metrics, strict=True)),
+        ]
+        for each in found[:MOST_LINES]
+    ]  # fmt: skip
+    sides = "".join("l" if isinstance(value, str) else "r" for value in found[0].at)
+    yield from table(headings, rows, f"{sides}r")
+    if (more := len(found) - MOST_LINES) > 0:
+        yield f"... and {more} more: choose with --where KEY=VALUE, or see the page of `harness report`"
+
+
+def cycling(comparison: Comparison) -> str:
+    """In how many flights of each value of what is compared a limit cycle shows."""
+    flights = comparison.table
+    shares = ((value, _cycling(flights[flights[comparison.by] == value])) for value in ordered(flights[comparison.by]))
+    told = ", ".join(f"{shown(value)} {share}" for value, share in shares if share.of)
+    return f"In a limit cycle, of the flights in which it can be told: {told}." if told else ""

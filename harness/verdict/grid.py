@@ -1,0 +1,119 @@
+"""A map: one metric over two numeric axes, a cell for each combination that was flown."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import pandas as pd
+
+from harness.error import did_you_mean
+from harness.log.metric import METRICS, YES_OR_NO
+from harness.tables import number, table
+from harness.verdict.comparison import Comparison
+from harness.verdict.pairs import CompareError, is_ordered, ordered, shown, spread
+
+DEFAULT = ("chatters", "range_error_rms_m")  # drawn where none is asked for
+ROUNDING = 1e-6  # of any metric: no map of rounding noise
+BEYOND = "*"  # marks a cell in which a limit cycle is predicted
+_MOST_GRIDS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class GridCell:
+    """The flights of one combination: the median of the metric, or the share of yes; NaN where it is not known."""
+
+    value: float
+    margin: float  # to the predicted limit cycle; NaN where it is not known
+    keys: tuple[str, ...]
+
+    @property
+    def beyond(self) -> bool:
+        """Whether a limit cycle is predicted."""
+        return self.margin < 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """One metric by two axes, of the flights that are alike in everything else."""
+
+    metric: str
+    value: str  # of what is compared
+    at: Mapping[str, object]  # what is the same in all cells, of what varies
+    rows: tuple[str, Sequence[object]]  # axis and values
+    columns: tuple[str, Sequence[object]]
+    cells: Mapping[tuple[object, object], GridCell]
+
+    @property
+    def title(self) -> str:
+        metric = METRICS[self.metric]
+        unit = " (share of flights)" if metric.unit == YES_OR_NO else ""
+        return f"{self.metric}{unit} at " + ", ".join(f"{axis} = {shown(value)}" for axis, value in self.at.items())
+
+    def shade(self, cell: GridCell) -> float:
+        """How far up its value lies between the smallest of the map and the largest, 0 to 1."""
+        known = [each.value for each in self.cells.values() if not math.isnan(each.value)]
+        reach = max(known) - min(known) if known else 0.0
+        return (cell.value - min(known)) / reach if reach > ROUNDING and not math.isnan(cell.value) else 0.0
+
+    def text(self, cell: GridCell | None) -> str:
+        """What stands in a cell."""
+        return "" if cell is None else number(None if math.isnan(cell.value) else cell.value)
+
+
+def grids(comparison: Comparison, metric: str) -> list[Grid]:
+    """A map for each value of what is compared, and of the other axes, by the two numeric axes of most values.
+
+    Empty where fewer than two numeric axes vary. Raises `CompareError` for an unknown metric.
+    """
+    if metric not in METRICS:
+        hint = did_you_mean(metric, METRICS)
+        raise CompareError(f"--map {metric}: no metric has this name{hint}; see `harness list metrics`")
+    numeric = [axis for axis, values in comparison.axes.items() if is_ordered(values)]
+    numeric = sorted(numeric, key=lambda axis: -len(comparison.axes[axis]))[:2]
+    if len(numeric) < 2:
+        return []
+    first, second = (axis for axis in comparison.axes if axis in numeric)
+    flights = spread(comparison.table)
+    if comparison.by not in flights:
+        flights[comparison.by] = comparison.table[comparison.by]
+    fixed = [*(axis for axis in comparison.axes if axis not in numeric), comparison.by]
+    found = []
+    for at in product(*(ordered(flights[axis]) for axis in fixed)):
+        there = pd.Series(True, index=flights.index)
+        for axis, value in zip(fixed, at, strict=True):
+            there &= flights[axis].map(shown) == shown(value)
+        cells = {(row, column): _cell(rows, metric) for (row, column), rows in flights[there].groupby([first, second])}
+        if cells:
+            rows, columns = ((axis, ordered(flights.loc[there, axis])) for axis in (first, second))
+            found.append(Grid(metric, shown(at[-1]), dict(zip(fixed, at, strict=True)), rows, columns, cells))
+    return found
+
+
+def _cell(rows: pd.DataFrame, metric: str) -> GridCell:
+    known = rows[metric].dropna()
+    typical = known.mean() if METRICS[metric].unit == YES_OR_NO else known.median()
+    margins = rows["limit_cycle_margin"].dropna() if "limit_cycle_margin" in rows else known[:0]
+    return GridCell(
+        float(typical) if len(known) else math.nan,
+        float(margins.iloc[0]) if len(margins) else math.nan,
+        tuple(rows["key"]),
+    )
+
+
+def lines(found: Sequence[Grid]) -> Iterator[str]:
+    """Maps for a terminal."""
+    for grid in found[:_MOST_GRIDS]:
+        (down, rows), (across, columns) = grid.rows, grid.columns
+        yield ""
+        yield f"{grid.title}; {down} down, {across} across:"
+        body = [[shown(row), *(_marked(grid, grid.cells.get((row, column))) for column in columns)] for row in rows]
+        yield from (f"  {line}" for line in table(["", *(f"{shown(column)} " for column in columns)], body, "r"))
+    if len(found) > _MOST_GRIDS:
+        yield f"... and {len(found) - _MOST_GRIDS} more maps: choose with --where KEY=VALUE"
+    if any(cell.beyond for grid in found for cell in grid.cells.values()):
+        yield f"{BEYOND} a limit cycle is predicted behind the airframe's inner loop (`harness predict`)"
+
+
+def _marked(grid: Grid, cell: GridCell | None) -> str:
+    return f"{grid.text(cell)}{BEYOND if cell and cell.beyond else ' '}"
