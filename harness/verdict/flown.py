@@ -24,7 +24,7 @@ class Shares(NamedTuple):
         return f"{self.number} of {self.of}" if self.of else "-"
 
 
-class Combination(NamedTuple):
+class Flown(NamedTuple):
     """Flights that differ only in the seed and in what is drawn from it."""
 
     at: tuple[object, ...]  # the value of each axis
@@ -36,7 +36,7 @@ class Combination(NamedTuple):
     keys: tuple[str, ...]
 
 
-def combinations(comparison: Comparison) -> tuple[list[str], list[Combination]]:
+def combinations(comparison: Comparison) -> tuple[list[str], list[Flown]]:
     """The axes, what is compared among them, and every combination of their values that was flown, in order."""
     flights = spread(comparison.table)
     if comparison.by not in flights:
@@ -49,8 +49,8 @@ def combinations(comparison: Comparison) -> tuple[list[str], list[Combination]]:
     return axes, found
 
 
-def _combination(at: tuple[object, ...], rows: pd.DataFrame) -> Combination:
-    return Combination(
+def _combination(at: tuple[object, ...], rows: pd.DataFrame) -> Flown:
+    return Flown(
         at, len(rows), int(rows["lost"].sum()), int(rows["converged"].sum()), _cycling(rows),
         tuple(float(known.median()) if len(known := rows[name].dropna()) else None for name in TOLD),
         tuple(rows["key"]),
