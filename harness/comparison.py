@@ -53,7 +53,7 @@ def compare_chosen(
     """The flights with these settings compared. Raises `CompareError` with what is missing or unknown."""
     if by not in settings_of(flights):
         raise CompareError(_unknown("by", by, settings_of(flights)))
-    return compare_flights(_chosen(flights, where), assess, by, baseline, question)
+    return compare_flights(chosen(flights, where), assess, by, baseline, question)
 
 
 def _checked(results: pd.DataFrame) -> pd.DataFrame:
@@ -67,7 +67,8 @@ def _checked(results: pd.DataFrame) -> pd.DataFrame:
     return as_results(results.drop_duplicates("key").reset_index(drop=True))
 
 
-def _chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
+def chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
+    """The flights with these settings, a list for several values of one. Raises `CompareError` with what there is."""
     for key, wanted in where.items():
         if key not in settings_of(flights):
             raise CompareError(_unknown("where", key, settings_of(flights)))

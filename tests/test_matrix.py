@@ -51,6 +51,40 @@ def test_a_matrix_is_the_product_of_its_axes_with_the_plant_fastest(matrix: Read
     ]
 
 
+def test_set_takes_an_axis_which_replaces_the_files_and_needs_none(matrix: Read) -> None:
+    m = matrix('[matrix]\n"law.k2" = [1.0, 2.0]\nseed = [3, 4]\n', "law.k2=[5.0, 6.0, 7.0]", "plant=sixdof")
+    assert m.varies == {"law.k2": 3, "seed": 2}
+    assert values(m, "law.k2") == [5.0, 5.0, 6.0, 6.0, 7.0, 7.0]
+    assert {m.flight(combination).plant for combination in m.combinations()} == {"sixdof"}
+    swept = matrix("", "seed={start=20, count=3}", "start.heading_deg={uniform=[0, 90]}")
+    assert values(swept, "seed") == [20, 21, 22]
+    assert len({round(heading, 6) for heading in values(swept, "start.heading_deg")}) == 3
+    assert swept.identifier != matrix("", "seed={start=20, count=4}", "start.heading_deg={uniform=[0, 90]}").identifier
+
+
+def test_a_setting_that_is_a_list_takes_a_list_of_lists(matrix: Read) -> None:
+    assert len(matrix("", "wind.steady_mps=[1.0, 2.0]")) == 1
+    assert values(matrix("", "wind.steady_mps=[[0, 0], [1, 2]]"), "wind.steady_mps") == [[0, 0], [1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("law.k2=[]", "--set law.k2=[]: the list is empty"),
+        ("seed={start=1}", "--set seed={start=1}: has the keys start, must be a list, { start, count }"),
+    ],
+)
+def test_a_mistake_in_an_axis_of_the_command_line_is_told_there(matrix: Read, override: str, told: str) -> None:
+    with pytest.raises(SettingsError, match=f"^{re.escape(told)}"):
+        matrix("", override)
+
+
+def test_a_wrong_value_in_an_axis_of_the_command_line_is_told_there(matrix: Read) -> None:
+    m = matrix("", 'law.k2=[1, "a"]')
+    with pytest.raises(SettingsError, match=r'^--set law\.k2=.*: flight\.law\.k2: is "a", must be a number > 0'):
+        [m.flight(combination) for combination in m.combinations()]
+
+
 def test_expansion_is_the_same_when_built_twice_and_is_lazy(matrix: Read) -> None:
     text = (
         '[matrix]\nplant = ["kinematic", "sixdof"]\n"start.heading_deg" = { uniform = [0.0, 360.0] }\n'

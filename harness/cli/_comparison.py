@@ -1,4 +1,4 @@
-"""What `compare` and `report` share: the flights of a directory, their origin, and the margins that judge them."""
+"""What `compare`, `report` and `show` share: which flights are wanted, where they come from, what judges them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def read_comparison(
         flights, assess = flights_and_margins(folder, overrides)
         run = last_run(folder)
         question = str(run["question"] or "")
-        comparison = compare_chosen(flights, assess, by, _value(baseline), _chosen(where), question)
+        comparison = compare_chosen(flights, assess, by, _value(baseline), wanted(where), question)
         return comparison, origin_of(str(folder), run)
     except SettingsError as error:
         raise BadInput(str(error)) from None
@@ -43,7 +43,7 @@ def read_comparison(
         raise BadInput(text if text.startswith(str(folder)) else f"{folder}: {text}") from None
 
 
-def _chosen(where: tuple[str, ...]) -> dict[str, object]:
+def wanted(where: tuple[str, ...]) -> dict[str, object]:
     """KEY=VALUE texts as settings; a key that is given twice keeps all its values."""
     chosen: dict[str, object] = {}
     for text in where:

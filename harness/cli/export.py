@@ -1,4 +1,4 @@
-"""`harness export`: the log of a flight as a table for other programs."""
+"""`harness export`: the log of a flight, or the flights of a run, as a table for other programs."""
 
 from __future__ import annotations
 
@@ -12,31 +12,39 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("what", metavar="DIR:KEY|FILE.rrd")
+@click.argument("what", metavar="DIR:KEY|FILE.rrd|DIR")
 @click.option("--to", "kind", type=click.Choice(["csv", "parquet"]), required=True, help="Format of the table.")
 @click.option("--flight", metavar="NAME", help="Which flight of a FILE.rrd that holds several.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="The file.  [default: KEY or FILE, with the format's suffix]"
+    "--out", type=click.Path(path_type=Path), help="The file.  [default: KEY, FILE or DIR, with the format's suffix]"
 )
 def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
-    """Write the log of a flight as a CSV or Parquet table.
+    """Write the log of a flight, or the flights of a run, as a table.
 
-    One row for each guidance period; SI units, rad, north-east-down; a cell is empty where the plant has no such
-    quantity. CSV has every digit of a double. A flight of a run without a recording is flown again and compared with
-    what is stored. Prints the file, its rows and its columns.
+    CSV or Parquet. Of a flight: one row for each guidance period; SI units, rad, north-east-down; a cell is empty where
+    the plant has no such quantity. CSV has every digit of a double. A flight of a run without a recording is flown again and compared
+    with what is stored. Of DIR, a folder that `harness run` wrote: one row for each flight, with its settings and
+    metrics; the unit is the suffix of a column, and in Parquet in its metadata too. Prints the file, its rows and its
+    columns.
 
     \b
     Examples:
       harness export out/wind:3f2a --to csv
       harness export flight.rrd --to parquet --out flight.parquet
+      harness export out/wind --to csv --out wind.csv
     """
+    import shutil
+
     from harness.cli._paths import writable
     from harness.files import replacing
+    from harness.runs.results import export as write_table
 
     table, name = _table(what, flight)
     path = writable(out or Path(f"{name}.{kind}"))
     with replacing(path) as partial:
-        if kind == "csv":
+        if kind == "parquet" and Path(what).is_dir():
+            shutil.copyfile(write_table(Path(what)), partial)  # its columns say their units
+        elif kind == "csv":
             table.to_csv(partial, index=False)
         else:
             table.to_parquet(partial, index=False)
@@ -62,9 +70,11 @@ def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
             log = flight_of_row(place.folder, place.beginning, lambda line: click.echo(line, err=True))
             return pd.DataFrame(log.table, columns=list(COLUMNS)), find(*place).row["key"]
         if Path(what).is_dir():
-            raise BadInput(
-                f"{what}: is a folder; a flight in it is {what}:KEY, and `harness show {what}` lists the keys"
-            )
+            if flight is not None:
+                raise BadInput(f"{what}: is a folder of flights; --flight is for a FILE.rrd")
+            from harness.runs.results import load_results
+
+            return load_results(what), Path(what).absolute().name
         from harness.review.reading import read_recording
 
         return read_recording(Path(what), flight), Path(what).stem

@@ -28,7 +28,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "check": Entry("check:check", "Check a settings file without flying it."),
             "predict": Entry("predict:predict", "Predict the limit cycle of a flight without flying it."),
             "view": Entry("view:view", "Open flights in the Rerun viewer."),
-            "export": Entry("export:export", "Write the log of a flight as a CSV or Parquet table."),
+            "export": Entry("export:export", "Write the log of a flight, or the flights of a run, as a table."),
         },
         "Many flights": {
             "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),

@@ -15,7 +15,13 @@ import click
     type=click.Choice(["all", "sample", "failed", "none"]),
     help="Which flights are recorded, in OUT/flights. [default: all up to 50 flights, else sample]",
 )
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Set a key, or several values of it; repeatable.",
+)
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that failed.")
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight after S s. [default: 20 x its estimate]")
 @click.option("--dry-run", is_flag=True, help="Print the size of the matrix, its warnings and the time it takes.")
@@ -41,6 +47,7 @@ def run(
       harness run experiments/wind.toml --dry-run
       harness run experiments/wind.toml --out out/wind
       harness run experiments/wind.toml --out out/wind --retry failed
+      harness run experiments/stationary.toml --out out/k2 --set 'law.k2=[1,3,12]' --set 'seed={start=0,count=8}'
     """
     import os
 

@@ -111,6 +111,16 @@ def _is_form(table: Mapping[str, object]) -> bool:
     return not _FORM_KEYS.isdisjoint(table) and tables <= {"towards_deg"}
 
 
+def is_axis(value: object, *, of_lists: bool) -> bool:
+    """Whether the value of `--set` stands for several: a list of values, or a table that describes them.
+
+    `of_lists`: the setting is a list itself, so that only a list of lists is several values of it.
+    """
+    if isinstance(value, list):
+        return not of_lists or (bool(value) and all(isinstance(element, list) for element in value))
+    return isinstance(value, Mapping) and _is_form(value)
+
+
 def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -> Axis:
     """The axis of an entry `name = value`. Raises ValueError, without a place, for a mistake in it.
 

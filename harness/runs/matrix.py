@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 from harness.flight import Flight
 from harness.key import hashed
-from harness.runs.axis import Axis, Draw, axis, flattened
+from harness.runs.axis import Axis, Draw, axis, flattened, is_axis
 from harness.settings import Experiment, SettingsError, SettingsFile, flight_from_document, put
+from harness.settings.keys import is_list
 from harness.settings.toml_locator import Key, nearest_line
 from harness.world.randomness import stream
 
@@ -42,6 +43,7 @@ class Matrix:
     experiment: Experiment
     blocks: Sequence[Block]
     excluded: Sequence[Mapping[str, object]]
+    given: Mapping[str, object]  # axes of the command line: the values as `--set` gives them
 
     @property
     def positions(self) -> int:
@@ -58,6 +60,8 @@ class Matrix:
         """A hash of the matrix: where it is equal, equal positions have equal settings."""
         tables = {name: self.file.document.get(name) for name in ("flight", "matrix", "exclude", "include")}
         tables["overrides"] = sorted(".".join(map(str, key)) for key in self.file.overrides)
+        if self.given:
+            tables["given"] = self.given
         return hashed({**_plain(tables), "folder": str(self.file.path.parent.absolute())})
 
     def __len__(self) -> int:
@@ -138,15 +142,17 @@ class Matrix:
 def read_matrix(file: SettingsFile) -> Matrix:
     """The matrix of a file; a file without [matrix] gives a matrix of one flight. Raises `SettingsError`.
 
-    A key that `--set` gives is not an axis: it has that value in every flight.
+    A key that `--set` gives is no axis of the file: it has that value in every flight. Several values, as in
+    `--set law.k2=[1,2,3]`, are an axis themselves.
     """
     experiment = file.experiment()
     mistakes: list[str] = []
     fixed = [key[1:] for key in file.overrides]
-    first = _block(file, ("matrix",), experiment.matrix, lists=True, fixed=fixed, mistakes=mistakes)
+    file, given, more = _given(file, mistakes)
+    first = _block(file, ("matrix",), experiment.matrix, more, lists=True, fixed=fixed, mistakes=mistakes)
     blocks = [first]
     for i, table in enumerate(experiment.include):
-        blocks.append(_block(file, ("include", i), table, lists=False, fixed=fixed, mistakes=mistakes))
+        blocks.append(_block(file, ("include", i), table, more, lists=False, fixed=fixed, mistakes=mistakes))
     excluded = [
         checked
         for i, table in enumerate(experiment.exclude)
@@ -154,13 +160,40 @@ def read_matrix(file: SettingsFile) -> Matrix:
     ]
     if mistakes:
         raise SettingsError(mistakes)
-    return Matrix(file, experiment, blocks, excluded)
+    return Matrix(file, experiment, blocks, excluded, given)
+
+
+def _given(file: SettingsFile, mistakes: list[str]) -> tuple[SettingsFile, Mapping[str, object], list[Axis]]:
+    """The file without the overrides that stand for several values, these values by key, and their axes."""
+    document = deepcopy(dict(file.document))
+    given: dict[str, object] = {}
+    axes = []
+    for key, text in file.overrides.items():
+        table: Any = document
+        for word in key[:-1]:
+            table = table[word]
+        name = ".".join(map(str, key[1:]))
+        if key[0] != "flight" or not is_axis(table[key[-1]], of_lists=is_list(name)):
+            continue
+        given[name] = table.pop(key[-1])
+        try:
+            axes.append(axis(name, given[name], lists=True, line=lambda _: 0))
+        except ValueError as error:
+            mistakes.append(f"--set {text}: {error}")
+    return replace(file, document=document), given, axes
 
 
 def _block(
-    file: SettingsFile, at: Key, table: Mapping[str, object], *, lists: bool, fixed: Sequence[Key], mistakes: list[str]
+    file: SettingsFile,
+    at: Key,
+    table: Mapping[str, object],
+    given: Sequence[Axis],
+    *,
+    lists: bool,
+    fixed: Sequence[Key],
+    mistakes: list[str],
 ) -> Block:
-    axes: list[Axis] = []
+    axes = [*given]
     seen: set[str] = set()
     for key, name, value in flattened(table):
         where = (*at, *key)

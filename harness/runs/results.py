@@ -44,7 +44,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     return as_results(_declared(table).to_pandas())
 
 
-def export(folder: Path) -> None:
+def export(folder: Path) -> Path:
     """Writes the table to flights.parquet, unless no flight was added since; the file is complete or unchanged."""
     import pyarrow.parquet as pq
 
@@ -52,10 +52,11 @@ def export(folder: Path) -> None:
     with reading(folder) as journal:
         now = state(journal)
         if _is_current(path, now):
-            return
+            return path
         table = _declared(_table(journal)).replace_schema_metadata({_STATE: now})
     with replacing(path) as partial:
         pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
+    return path
 
 
 def _is_current(path: Path, now: str) -> bool:

@@ -25,6 +25,16 @@ def file_key(name: str) -> Key:
     return tuple(key)
 
 
+def is_list(name: str) -> bool:
+    """Whether the setting of this dotted key in a file is a list itself, as `wind.steady_mps` is."""
+    table: TableSchema | None = flight_table(TableSchema({}, dict))
+    setting = None
+    for word in name.split("."):
+        setting = table.settings.get(word) if table else None
+        table = setting.table if setting else None
+    return setting is not None and setting.length is not None
+
+
 def put(document: dict[str, Any], name: str, value: object) -> Key:
     """Sets a value in the [flight] of a document by its dotted name, as in `law.gains`; returns its key in the file.
 
