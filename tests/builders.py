@@ -116,11 +116,13 @@ def copied_airframe(name: str, folder: Path) -> Path:
 
 
 def log_of(columns: Mapping[str, ArrayLike], duration: float = 100.0) -> FlightLog:
-    """A log at 20 Hz in level flight at 13 m/s with these columns; the others are 0, or NaN where no plant has them."""
+    """A log at 20 Hz, half a lap in 100 s at 13 m/s, with these columns; the others are 0, or NaN as of any plant."""
     time = np.arange(0.0, duration, 0.05)
     unknown = dict.fromkeys(("bank", "sideslip", "lateral_acceleration"), np.nan)
     table = np.zeros((len(time), len(COLUMNS)))
-    for name, values in {"time": time, "airspeed": 13.0, "altitude": 150.0, **unknown, **columns}.items():
+    angle = 0.5 * math.tau * time / 100.0
+    circle = {"north": 200.0 * np.cos(angle), "east": 200.0 * np.sin(angle)}
+    for name, values in {"time": time, "airspeed": 13.0, "altitude": 150.0, **circle, **unknown, **columns}.items():
         table[:, COLUMNS.index(name)] = values
     return FlightLog(replace(FLIGHT, duration=duration), Outcome.COMPLETED, "", table)
 
@@ -136,7 +138,7 @@ SETTINGS: Mapping[str, object] = {
 }  # fmt: skip
 QUIET: Mapping[str, float] = {
     **dict.fromkeys(METRICS, 0.0), "convergence_time_s": 40.0, "heading_rate_gain": 1.0, "turn_ratio": 1.0,
-    "heading_rate_lag_s": 0.001, "bank_reserve_deg": 30.0,
+    "heading_rate_lag_s": 0.001, "bank_reserve_deg": 30.0, "laps": 1.0, "goes_round": 1.0,
 }  # fmt: skip
 
 

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 from autopilot.laws import law
 from harness.log import FlightLog
 from harness.log.metric import METRICS, YES_OR_NO, measure, window_in_words
+from harness.loop import simulate
 from harness.plants.plant import Outcome
 from harness.settings.columns import is_setting
 from harness.world.wind import Wind
-from tests.builders import log_of
+from tests.builders import FLIGHT, log_of
 
 TIME = np.arange(0.0, 100.0, 0.05)
 
@@ -57,6 +58,23 @@ def test_a_flight_that_ended_early_has_not_converged(outcome: Outcome) -> None:
     assert [judged[name] for name in METRICS if name.startswith("convergence_time")] == [None] * 3
     assert (judged["window_begin_s"], judged["window_laps"]) == (50.0, None)
     assert window_in_words(judged).endswith("to 99.95 s: the last half, since the flight did not converge.")
+
+
+@pytest.mark.parametrize(("laps", "settles"), [(0.01, False), (0.09, False), (0.12, True), (-0.12, True)])
+def test_on_the_circle_without_going_round_a_flight_does_not_settle(laps: float, settles: bool) -> None:
+    """A lap takes 96.7 s in still air: 0.103 laps in 100 s are a tenth of that pace."""
+    judged = measure(circling(laps, 0.1))
+    assert judged["laps"] == pytest.approx(abs(laps))
+    assert (judged["convergence_time_s"] is not None, judged["goes_round"]) == (settles, settles)
+
+
+@pytest.mark.parametrize(("wind", "settles"), [(11.7, True), (12.999, False)])
+def test_a_flight_that_hangs_against_the_wind_does_not_settle(wind: float, settles: bool) -> None:
+    steep = law("nftsm", "fitted", max_heading_rate=math.radians(45.0))
+    log = simulate(replace(FLIGHT, law=steep, duration=400.0, wind=Wind(steady=(wind, 0.0))))
+    judged = measure(log)
+    assert np.abs(log["range_error"][600:]).max() < 1.0
+    assert (judged["convergence_time_s"] is not None, judged["goes_round"]) == (settles, settles)
 
 
 def test_circling_is_judged_over_the_last_whole_laps_after_convergence() -> None:

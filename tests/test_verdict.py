@@ -158,16 +158,22 @@ def test_lost_flights_count_against_their_cell_and_never_as_data() -> None:
     assert severe.why == "3 of 12 flights ended early"
     assert severe.difference == pytest.approx(0.5, abs=0.2)
     text = "\n".join(lines(compared(flights)))
-    assert "3 of 24 flights with plant = sixdof ended early." in text
+    assert "3 of 24 flights with plant = sixdof ended early: 3 departed." in text
 
 
 def test_flights_lost_on_both_plants_are_told_of_both_before_anything_else() -> None:
     flights = result_matrix()
     flights["outcome"] = "target_lost"
     answer = compared(flights).answer
-    assert "12 of 12 flights with plant = kinematic ended early." in answer
-    assert "12 of 12 flights with plant = sixdof ended early." in answer
+    compared_, *said = answer.splitlines()
+    assert compared_.startswith("Compared: ")
+    assert said[:3] == [
+        "12 of 12 flights with plant = kinematic ended early: 12 target_lost.",
+        "12 of 12 flights with plant = sixdof ended early: 12 target_lost.",
+        "",
+    ]
     assert "constant airspeed" not in answer
+    assert "does not circle" not in answer  # another cause
 
 
 def test_a_convergence_time_is_of_pairs_that_both_converge_and_holds_only_where_all_do() -> None:
@@ -189,6 +195,16 @@ def test_where_the_law_does_not_circle_on_the_baseline_the_cost_says_nothing() -
     (sideslip,) = card_of(flights).of("sideslip_rms_deg")
     assert (error.pairs, sideslip.pairs) == (SEEDS - 6, SEEDS)
     assert error.difference == pytest.approx(1.0, abs=0.02)
+
+
+def test_where_the_baseline_does_not_go_round_its_target_the_cost_says_nothing() -> None:
+    """Held up by the wind, with a small range error: it does not circle."""
+    flights = shifted(result_matrix(), "range_error_rms_m", 1.0)
+    flights.loc[flights["seed"] < 6, "goes_round"] = 0.0
+    (error,) = card_of(flights).of("range_error_rms_m")
+    assert error.pairs == SEEDS - 6
+    older = flights.drop(columns=["goes_round", "laps"])
+    assert card_of(older).of("range_error_rms_m")[0].pairs == SEEDS
 
 
 def test_holm_makes_a_lonely_test_harder_in_company() -> None:

@@ -30,6 +30,7 @@ Value = (
 
 YES_OR_NO = "yes/no"  # the unit of a metric that is true or false
 SETTLED_FOR = 5.0  # s: at least so much of the flight is left after convergence
+LEAST_PACE = 0.1  # of v_a / R_d, that in still air: up to w = 0.9 v_a no part of a circle is flown at less
 AVERAGED_OVER = 0.25  # s
 LONGEST_LAG = 2.0  # s
 LEAST_EXCITATION = np.radians(0.5)  # rad/s: a command, or a turn, that varies less tells nothing of lag or ratio
@@ -73,12 +74,30 @@ class Signals:
     def settling_time(self, tolerances: float = 1.0) -> float | None:
         """When |range error| is below so many times the flight's tolerance for good, s; see `SETTLED_FOR`.
 
-        None of a flight that ended early: what it would have done next is not known.
+        None of a flight that ended early: what it would have done next is not known. None too of one that does not go
+        round its target from then on: on its circle, but held up by the wind.
         """
         if self.log.outcome is not Outcome.COMPLETED:
             return None
         tolerance = tolerances * self.log.flight.metrics.tolerance
-        return settling_time(self.log["time"], self.log["range_error"], tolerance, SETTLED_FOR)
+        settled = settling_time(self.log["time"], self.log["range_error"], tolerance, SETTLED_FOR)
+        return settled if settled is not None and self.goes_round(self._row(settled)) else None
+
+    @cached_property
+    def around(self) -> Array:
+        """Direction from the target to the aircraft, rad, counted on beyond a whole turn."""
+        log = self.log
+        return azimuth(log["north"] - log["target_north"], log["east"] - log["target_east"])
+
+    def goes_round(self, first: int) -> bool:
+        """Whether the aircraft goes round its target from this row on, at `LEAST_PACE` at least."""
+        flight, time = self.log.flight, self.log["time"]
+        in_still_air = flight.start.airspeed / flight.law.standoff * (time[-1] - time[first])
+        return bool(abs(self.around[-1] - self.around[first]) >= LEAST_PACE * in_still_air)
+
+    def _row(self, time: float) -> int:
+        """The first row that is not before this time, s."""
+        return int(np.searchsorted(self.log["time"], time))
 
     @cached_property
     def window(self) -> Window:
@@ -90,8 +109,8 @@ class Signals:
         log, converged = self.log, self.settling_time()
         if converged is None or feasibility_margin(log.flight) < 0.0:
             return Window(len(log) // 2, None)
-        first = int(np.searchsorted(log["time"], converged))
-        around = azimuth(log["north"] - log["target_north"], log["east"] - log["target_east"])[first:]
+        first = self._row(converged)
+        around = self.around[first:]
         left = np.abs(around[-1] - around)  # rad round the target from each row to the end
         laps = int(left[0] / math.tau)
         return Window(first + int(np.flatnonzero(left >= laps * math.tau)[-1]) if laps else first, laps)
@@ -275,7 +294,7 @@ _METRICS = (
     Metric(
         name="convergence_time_s",
         unit="s",
-        meaning="first time after which |range error| stays below the tolerance, 5 s of it at least",
+        meaning="first time after which |range error| stays below the tolerance, 5 s at least, on the way round",
         measure=lambda signals: signals.settling_time(),
         heading="convergence time",
         in_short_tables=True,
@@ -323,6 +342,22 @@ _METRICS = (
         meaning="whole laps judged; 0: less than one is left after convergence; none: the last half, not settled",
         measure=lambda signals: None if signals.window.laps is None else float(signals.window.laps),
         heading="laps judged",
+        compared=False,
+    ),
+    Metric(
+        name="laps",
+        unit="1",
+        meaning="times that the aircraft goes round the target, over the whole flight",
+        measure=lambda signals: abs(float(signals.around[-1] - signals.around[0])) / math.tau,
+        heading="laps",
+        compared=False,
+    ),
+    Metric(
+        name="goes_round",
+        unit=YES_OR_NO,
+        meaning="whether, while circling is judged, it goes round in at most ten times the time of still air",
+        measure=lambda signals: signals.goes_round(signals.window.first),
+        heading="goes round",
         compared=False,
     ),
     Metric(

@@ -75,9 +75,9 @@ def _flight_lines(row: Mapping[str, Any], settings: Mapping[str, Any]) -> Iterat
     if row["outcome"] == Outcome.COMPLETED:
         settled, tolerance = row["metrics"]["convergence_time_s"], settings["metrics"]["tolerance_m"]
         yield (
-            f"The range error did not settle below {tolerance:g} m."
+            f"The flight did not settle on its circle within {tolerance:g} m."
             if settled is None
-            else f"The range error settled below {tolerance:g} m in {number(settled)} s."
+            else f"The flight settled on its circle within {tolerance:g} m in {number(settled)} s."
         )
 
 

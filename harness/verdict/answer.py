@@ -25,7 +25,6 @@ def opening(comparison: Comparison) -> Iterator[str]:
     if comparison.question:
         yield comparison.question
     yield from compared(comparison)
-    yield from lost(comparison)
 
 
 def answers(comparison: Comparison) -> Iterator[str]:
@@ -104,7 +103,7 @@ def worst(card: Scorecard, part: Part) -> Judgement:
 
 
 def compared(comparison: Comparison) -> Iterator[str]:
-    """What was compared, and what varies."""
+    """What was compared, and what varies; then the flights that were lost, before all that is said of the others."""
     seeds = comparison.pairs.other["seed"].nunique()
     varies = ", ".join(f"{axis} ({len(values)})" for axis, values in comparison.axes.items())
     yield (
@@ -112,6 +111,7 @@ def compared(comparison: Comparison) -> Iterator[str]:
         f"{counted(len(comparison.pairs), 'pair')}, {counted(seeds, 'seed')}, from "
         f"{counted(comparison.flights, 'flight')}; varies: {varies or 'nothing else'}."
     )
+    yield from _lost(comparison)
     margin = comparison.pairs.other["feasibility_margin_deg_s"]
     outrun, infeasible = int((margin == -math.inf).sum()), int(((margin < 0.0) & (margin > -math.inf)).sum())
     if outrun:
@@ -121,7 +121,8 @@ def compared(comparison: Comparison) -> Iterator[str]:
         )
     if infeasible:
         yield f"In {counted(infeasible, 'pair')} the heading-rate limit is below what holding the circle takes."
-    astray = int((~comparison.pairs.reference["circles"].astype(bool)).sum())
+    reference = comparison.pairs.reference
+    astray = int((~reference["circles"].astype(bool) & (reference["lost"] == 0.0)).sum())
     if astray:
         yield (
             f"In {counted(astray, 'pair')} the flight of {comparison.baseline} does not circle its target: "
@@ -131,12 +132,16 @@ def compared(comparison: Comparison) -> Iterator[str]:
         yield f"{counted(len(comparison.unpaired), 'flight')} could not be compared."
 
 
-def lost(comparison: Comparison) -> Iterator[str]:
-    """Flights that ended early, on both sides: they come before all that is said of the others."""
+def _lost(comparison: Comparison) -> Iterator[str]:
+    """Flights that ended early, on both sides, and how."""
     for given, flights in comparison.table.groupby(comparison.by, sort=False):
-        count = int(flights["lost"].sum())
-        if count:
-            yield f"{count} of {len(flights)} flights with {comparison.by} = {shown(given)} ended early."
+        how = flights["outcome"][flights["lost"] == 1.0].value_counts()
+        if len(how):
+            kinds = ", ".join(f"{count} {outcome}" for outcome, count in how.items())
+            yield (
+                f"{how.sum()} of {counted(len(flights), 'flight')} with {comparison.by} = {shown(given)} ended early: "
+                f"{kinds}."
+            )
 
 
 def worded(conclusion: Conclusion) -> str:

@@ -87,8 +87,8 @@ class Pairs:
 def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     """The flights as they enter a comparison, with the columns lost, converged and circles.
 
-    A flight that ended early has no metrics: it is counted as lost. A flight circles when it lasts and its settled
-    error is below `circling` times the standoff distance.
+    A flight that ended early has no metrics: it is counted as lost. A flight circles when it lasts, goes round its
+    target, and its settled error is below `circling` times the standoff distance.
     """
     table = flights.copy()
     lost = table["outcome"].isin(LOST)
@@ -101,7 +101,8 @@ def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     table["overshoot_m"] = table["overshoot_m"].fillna(0.0).where(~lost)  # an error without a change of sign
     table["lost"] = lost.astype(float)
     table["converged"] = (table["convergence_time_s"].notna() & ~lost).astype(float)
-    table["circles"] = (table["range_error_rms_m"] <= circling * table["law.standoff_m"]) & ~lost
+    astray = (table["goes_round"] == 0.0) | lost  # rows older than this metric do not say
+    table["circles"] = (table["range_error_rms_m"] <= circling * table["law.standoff_m"]) & ~astray
     return table
 
 

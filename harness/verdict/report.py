@@ -61,7 +61,7 @@ def page(comparison: Comparison, origin: Origin) -> str:
     return template("harness.verdict", "report.html.jinja").render(
         comparison=comparison,
         origin=origin,
-        head=[*answer.compared(comparison), *answer.lost(comparison)],
+        head=list(answer.compared(comparison)),
         words=answer,
         groups=[group for group in Group if any(part.group is group for part in judged_parts)],
         parts=judged_parts,
