@@ -236,9 +236,9 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
     assert told.returncode == 0, told.stderr
     for word in ("The flight lasted its full duration.", "sixdof ultra_stick_25e", "bank_peak_deg", row["digest"]):
         assert word in told.stdout
-    listed = command("show", out).stdout.splitlines()
-    assert len(listed) == 3 + 10  # a heading of two lines and a rule
-    assert [row["key"][:8], "sixdof", "0"] == listed[4].split()[:3]
+    heading, listed = command("show", out).stdout.rsplit("---\n")
+    assert len(listed.splitlines()) == 10
+    assert [row["key"][:8], "sixdof", "0"] == listed.splitlines()[1].split()[:3]
 
 
 def test_a_description_names_the_air_that_the_flight_met(file: Path, tmp_path: Path) -> None:
