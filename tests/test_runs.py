@@ -236,7 +236,7 @@ def test_a_row_of_the_store_is_what_fly_prints(file: Path, tmp_path: Path) -> No
     assert told.returncode == 0, told.stderr
     for word in ("The flight lasted its full duration.", "sixdof ultra_stick_25e", "bank_peak_deg", row["digest"]):
         assert word in told.stdout
-    heading, listed = command("show", out).stdout.rsplit("---\n")
+    _, listed = command("show", out).stdout.rsplit("---\n")
     assert len(listed.splitlines()) == 10
     assert [row["key"][:8], "sixdof", "0"] == listed.splitlines()[1].split()[:3]
 
