@@ -84,7 +84,7 @@ def _used() -> float:
 def fill(of: Matrix, folder: Path, count: int) -> None:
     """The store as after `count` flights: real settings and keys, each with the result of the first."""
     with Store(folder) as store:
-        store.begin(provenance(of.file.path, "", ""))
+        store.begin(provenance(of.file.path, of.file.text, "", ""))
         result = None
         for combination in of.combinations():
             if combination.position == count:

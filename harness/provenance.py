@@ -32,15 +32,15 @@ class Provenance(NamedTuple):
     python: str
 
 
-def provenance(file: Path, title: str, question: str) -> Provenance:
-    """The provenance of the run of `file` that begins now."""
+def provenance(file: Path, text: str, title: str, question: str) -> Provenance:
+    """The provenance of the run of `file`, whose text this is, that begins now."""
     commit, changes = _git("rev-parse", "HEAD"), _git("status", "--porcelain")
     return Provenance(
         now(),
         shlex.join(["harness", *sys.argv[1:]]),
         str(Path.cwd()),
         str(file),
-        file.read_text(encoding="utf-8-sig"),
+        text,
         title,
         question,
         commit,

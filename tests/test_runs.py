@@ -20,6 +20,7 @@ import pytest
 
 import harness
 from harness.log.metric import METRICS, YES_OR_NO
+from harness.runs.comparable import flights_and_margins
 from harness.runs.description import description
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, export, mixed_versions
@@ -160,6 +161,15 @@ def test_results_flown_before_a_metric_was_added_have_its_column_without_a_value
     assert results["added_m"].dtype == float
     assert results["is_added"].isna().all()
     assert results["is_added"].dtype == "boolean"
+
+
+def test_a_file_is_read_once_so_that_a_pipe_keeps_its_margins(tmp_path: Path) -> None:
+    out, text = tmp_path / "out", MATRIX + "[assess]\nrange_error_margin_m = 100.0\n"
+    run_it = words_of("run", "/dev/stdin", "--out", out, "--workers", 0, "--limit", 1, "--log", "none")
+    done = subprocess.run(run_it, input=text, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    _, margins = flights_and_margins(out)
+    assert margins.range_error_margin == 100.0
 
 
 def test_a_file_in_the_place_of_the_directory_is_told_and_left(file: Path) -> None:

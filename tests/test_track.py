@@ -121,6 +121,12 @@ def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
             load_track(tmp_path / name)
 
 
+def test_a_pipe_is_no_track(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.csv")
+    with pytest.raises(TrackError, match="is a pipe or a device, must be a file"):
+        load_track(tmp_path / "a.csv")
+
+
 def test_byte_order_mark_carriage_returns_and_blank_lines_at_the_end_are_no_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join([HEADER.replace(" ", ""), *ROWS, "", ""]).encode())

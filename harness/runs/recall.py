@@ -54,7 +54,7 @@ class Recalled:
 
     def file(self, name: str, overrides: Sequence[str] = ()) -> SettingsFile:
         """The row as a settings file of this name, with overrides KEY=VALUE. Raises `SettingsError`."""
-        return overridden(SettingsFile(Path(name), {"flight": dict(self.settings)}, {}, {}), overrides)
+        return overridden(SettingsFile(Path(name), "", {"flight": dict(self.settings)}, {}, {}), overrides)
 
 
 def recall(place: RowAddress) -> Recalled:

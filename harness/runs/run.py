@@ -54,7 +54,7 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
     """
     with Store(folder) as store:
         experiment = matrix.experiment
-        store.begin(provenance(matrix.file.path, experiment.title, experiment.question))
+        store.begin(provenance(matrix.file.path, matrix.file.text, experiment.title, experiment.question))
         count = len(matrix)
         progress = Progress(count if options.limit is None else min(count, options.limit))
         pending: dict[str, Identity] = {}

@@ -30,6 +30,7 @@ class SettingsFile:
     """A settings file that has been read but not checked."""
 
     path: Path
+    text: str  # as it was read, once: a pipe has no second time
     document: Mapping[str, object]  # in file units, with the overrides
     lines: Mapping[Key, int]  # the line of each key, from 1
     overrides: Mapping[Key, str]  # by key, the text KEY=VALUE that sets it
@@ -103,7 +104,7 @@ def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> 
         raise SettingsError([f"{path}:{line}: not valid TOML: {what}"]) from None
     except (ValueError, RecursionError) as error:  # a number with too many digits, arrays nested too deep
         raise SettingsError([f"{path}: not valid TOML: {error}"]) from None
-    return overridden(SettingsFile(path, document, key_lines(text), {}), overrides)
+    return overridden(SettingsFile(path, text, document, key_lines(text), {}), overrides)
 
 
 def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:

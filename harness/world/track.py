@@ -61,6 +61,8 @@ class Track:
 def load_track(path: Path) -> Track:
     """The track in a file. Raises `TrackError`."""
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise TrackError(f"{path}: is a pipe or a device, must be a file: it is read more than once")
         return _parsed(path, path.read_bytes())
     except TrackError:
         raise
