@@ -1,5 +1,6 @@
 """Recordings of real, short flights: what is in the file, what comes back, and that the viewer shows it."""
 
+import random
 import resource
 import subprocess
 import sys
@@ -96,6 +97,36 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.rrd").write_text("north, east\n" * 100)
     with pytest.raises(ValueError, match=r"text\.rrd: is not a complete recording"):
         read_recording(tmp_path / "text.rrd")
+
+
+def test_a_recording_with_one_wrong_bit_is_refused(kinematic: FlightLog, sixdof: FlightLog, tmp_path: Path) -> None:
+    whole, damaged, bits = tmp_path / "pair.rrd", tmp_path / "damaged.rrd", random.Random(1)
+    write_recording(whole, {"kinematic": kinematic, "sixdof": sixdof}, "Two")
+    written = whole.read_bytes()
+    for _ in range(120):
+        content = bytearray(written)
+        content[bits.randrange(len(content))] ^= 1 << bits.randrange(8)
+        damaged.write_bytes(content)
+        with pytest.raises(ValueError, match="damaged"):
+            read_recording(damaged, "sixdof")
+
+
+def test_a_recording_that_is_cut_or_doubled_is_refused(kinematic: FlightLog, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    write_recording(path, {"kinematic": kinematic}, "One")
+    written = path.read_bytes()
+    seal = written.index(b"CHECKSUM:")
+    old = written[:seal] + b"UNSEALED:" + written[seal + 9 :]  # as by an earlier version
+    for content, told in (
+        (written[: len(written) // 2], "is damaged"),
+        (2 * written, "is several recordings"),
+        (2 * old, "the times of its rows do not rise"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=told):
+            read_recording(path)
+    path.write_bytes(old)
+    assert read_logs(path)["kinematic"].digest == kinematic.digest
 
 
 def test_a_recording_read_whole_is_the_flights_that_were_written(

@@ -116,10 +116,12 @@ def _rows(folder: Path, keys: tuple[str, ...]) -> list[FlightLog]:
 def _of_file(path: Path, names: tuple[str, ...]) -> dict[str, FlightLog] | None:
     from harness.cli._input import BadInput
     from harness.review.reading import read_logs
+    from harness.review.seal import check
 
-    if not names:
-        return None
     try:
+        if not names:
+            check(path)
+            return None
         held = read_logs(path)
     except (OSError, ValueError) as error:
         raise BadInput(str(error)) from None

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,6 +12,7 @@ from rerun.chunk import RrdReader
 
 from harness.log import COLUMNS, FlightLog
 from harness.plants.plant import Outcome
+from harness.review.seal import check
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +31,7 @@ class _Held(NamedTuple):
 def read_recording(path: Path, flight: str | None = None) -> "pd.DataFrame":
     """The log of a recorded flight, bit for bit: SI, rad, NED. `flight` names it where the file holds several.
 
-    OSError when the file cannot be read, ValueError when there is no such flight in it.
+    OSError when the file cannot be read, ValueError when it is damaged or there is no such flight in it.
     """
     import pandas as pd
 
@@ -65,7 +67,7 @@ def _chosen(path: Path, names: list[str], flight: str | None) -> str:
 
 
 def _read(path: Path) -> dict[str, _Held]:
-    path.open("rb").close()  # for the OSError: Rerun raises RuntimeError for all that is wrong with a file
+    check(path)  # first, for the OSError: Rerun raises RuntimeError for all that is wrong with a file
     try:
         chunks = RrdReader(path).stream().filter(content="/runs/**").to_chunks()
     except RuntimeError as error:
@@ -85,10 +87,13 @@ def _read(path: Path) -> dict[str, _Held]:
         else:
             rows.setdefault(name, []).append(batch.column("Scalars:scalars").flatten().to_numpy())
     return {
-        name: _Held(
-            names,
-            np.concatenate([np.empty(0), *rows.get(name, [])]).reshape(-1, len(names)),
-            flights.get(name, ""),
-        )
+        name: _Held(names, _table(path, names, rows.get(name, [])), flights.get(name, ""))
         for name, names in columns.items()
     }
+
+
+def _table(path: Path, columns: Sequence[str], parts: Sequence[Array]) -> Array:
+    table = np.concatenate([np.empty(0), *parts]).reshape(-1, len(columns))
+    if "time" in columns and (np.diff(table[:, columns.index("time")]) <= 0.0).any():
+        raise ValueError(f"{path}: the times of its rows do not rise; was it appended to itself?")
+    return table

@@ -16,6 +16,7 @@ from harness.review.notes import flight_json, result_notes, settings_notes
 from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
+from harness.review.seal import PLACEHOLDER, sealed
 from harness.review.styled import StyledFlight, styled
 from harness.review.target_plots import target_plots
 
@@ -30,7 +31,7 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command
     ValueError for more flights than `styled.MOST`.
     """
     try:
-        content = _encoded(logs, title, notes, command)
+        content = sealed(_encoded(logs, title, notes, command))
     finally:
         clean_up()
     with replacing(path) as partial:
@@ -126,6 +127,7 @@ def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     to = Recorder()
     memory = to.stream.memory_recording()
     to.stream.set_log_time_enabled(False)
+    to.once("/notes/checksum", rr.TextDocument(PLACEHOLDER))
     to.layout(layout(content))
     to.stream.send_recording_name(title)
     log_surroundings(to, flights[0].log)

@@ -1,0 +1,39 @@
+"""The checksum that a recording carries of itself, so that a damaged one is not read for what was written.
+
+The recording is made with `PLACEHOLDER` as one of its texts, which no compression touches because no part of it occurs
+twice. The checksum takes its place, and is that of the whole file with the placeholder.
+"""
+
+import hashlib
+from pathlib import Path
+
+_MARK = b"CHECKSUM:"
+_NONE = b"abcdefghijklmnopqrstuvwxyz012345"  # as long as a checksum, and none
+PLACEHOLDER = (_MARK + _NONE).decode()
+
+
+def sealed(content: bytes) -> bytes:
+    """The recording with its checksum in place of the placeholder."""
+    before, placeholder, after = content.partition(PLACEHOLDER.encode())
+    assert placeholder
+    return before + _MARK + _checksum(content) + after
+
+
+def check(path: Path) -> None:
+    """Raises OSError when the file cannot be read, ValueError when it is not as it was sealed; one without seal passes.
+
+    Recordings of earlier versions have no seal.
+    """
+    content = path.read_bytes()
+    before, mark, after = content.partition(_MARK)
+    if not mark:
+        return
+    found, after = after[: len(_NONE)], after[len(_NONE) :]
+    if _MARK in after:
+        raise ValueError(f"{path}: is several recordings in one file, must be one")
+    if found != _checksum(before + PLACEHOLDER.encode() + after):
+        raise ValueError(f"{path}: is damaged, or was changed by another program: its checksum is another")
+
+
+def _checksum(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=len(_NONE) // 2).hexdigest().encode()
