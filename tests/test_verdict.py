@@ -174,6 +174,9 @@ def test_flights_lost_on_both_plants_are_told_of_both_before_anything_else() -> 
     ]
     assert "constant airspeed" not in answer
     assert "does not circle" not in answer  # another cause
+    assert Verdict.FAILS not in {judgement.word for judgement in card_of(flights).judgements}  # it costs no flight more
+    (last,) = card_of(flights).of("lost")
+    assert (last.word, last.difference, last.why) == (OPEN, 0.0, "12 of 12 flights of the baseline ended early")
 
 
 def test_a_convergence_time_is_of_pairs_that_both_converge_and_holds_only_where_all_do() -> None:

@@ -111,8 +111,11 @@ def _tested(
     lows, highs = (None if bound is None else bound * scale for bound in (low, high))
     bounds: Bounds = (None if lows is None else float(np.mean(lows)), None if highs is None else float(np.mean(highs)))
     barred = ""
-    if part.column != "lost" and lost.mean() > margins["lost_share"]:
-        barred = f"{int(lost.sum())} of {len(lost)} flights ended early"
+    if part.column == "lost":
+        lost = pairs.reference["lost"].to_numpy(bool)[cell.rows]
+    if lost.mean() > margins["lost_share"]:
+        of_which = "of the baseline " if part.column == "lost" else ""
+        barred = f"{int(lost.sum())} of {len(lost)} flights {of_which}ended early"
     elif part.column == "convergence_time_s":
         first, second = pairs.converged_alone(cell.rows)
         if first or second:

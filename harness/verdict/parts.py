@@ -69,7 +69,7 @@ PARTS: Mapping[str, Part] = {
         Part("no limit cycle", "chatters", "of the flights chatter", "chatter_share", "at most",
              Group.FOLLOWED, assumed=0.0, is_share=True),
         Part("flights that last", "lost", "of the flights lost", "lost_share", "at most",
-             Group.CONSEQUENCE, assumed=0.0, is_share=True),
+             Group.CONSEQUENCE, is_share=True),
         Part("convergence", "converged", "of the flights", "convergence_share_margin", "within", Group.CONSEQUENCE),
         Part("convergence time", "convergence_time_s", "s", "convergence_time_margin", "within",
              Group.CONSEQUENCE, relative=True),
