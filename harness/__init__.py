@@ -112,6 +112,8 @@ if not TYPE_CHECKING:  # to a type checker any name would be there
     def __getattr__(name: str) -> Any:
         for home, names in _HOMES.items():
             if name in names:
+                if message := import_module("harness.neighbours").in_the_way():
+                    raise ImportError(message)
                 value = globals()[name] = getattr(import_module(home), name)
                 return value
         raise AttributeError(f"module 'harness' has no attribute {name!r}")

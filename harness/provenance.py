@@ -74,7 +74,9 @@ def _git(*words: str) -> str | None:
     if not (_HERE / ".git").exists():
         return None
     try:
-        done = subprocess.run(["git", "-C", str(_HERE), *words], capture_output=True, text=True, check=True, timeout=10)
+        done = subprocess.run(
+            ["git", "-C", str(_HERE), *words], capture_output=True, errors="replace", check=True, timeout=10
+        )
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip()

@@ -1,5 +1,6 @@
 """Tables for a terminal and for Markdown, and how a number is written in their cells."""
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 
@@ -33,7 +34,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], alignment: str
 
 
 def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]], alignment: str = "l") -> Iterator[str]:
-    """The lines of the same table in Markdown; line ends in headings are spaces, and `|` in a cell is escaped."""
+    """The lines of the same table in Markdown; line ends in headings are spaces, and a bare `|` in a cell escaped."""
     sides = (alignment[min(column, len(alignment) - 1)] for column in range(len(headings)))
     yield _row(heading.replace("\n", " ") for heading in headings)
     yield "|" + "".join("--:|" if side == "r" else "---|" for side in sides)
@@ -41,7 +42,7 @@ def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]], alignment: 
 
 
 def _row(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(re.sub(r"(?<!\\)\|", r"\|", cell) for cell in cells) + " |"
 
 
 def number(value: float | bool | None, scale: float = 1.0) -> str:

@@ -1,12 +1,29 @@
-"""Files and folders that a command will write, tried before the work begins."""
+"""Files and folders on the command line; those that a command will write are tried before the work begins."""
 
 from __future__ import annotations
 
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
+
+import click
 
 from harness.cli._input import BadInput
+from harness.files import make_folder
+
+
+class PathType(click.Path):
+    """A path that is not empty: an empty one would be the working folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if str(value) == "":
+            self.fail("is empty, must name a file or a folder", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+PATH = PathType(path_type=Path)
+PATH_OR_ROW = PathType(path_type=str)  # DIR:KEY is no path
 
 
 def writable(path: Path) -> Path:
@@ -32,7 +49,7 @@ def writable_folder(path: Path) -> Path:
     try:
         if path.exists() and not path.is_dir():
             raise BadInput(f"{path}: is a file, not a folder")
-        path.mkdir(parents=True, exist_ok=True)
+        make_folder(path)
         _try_to_write(path)
     except OSError as error:
         raise BadInput(f"{path}: cannot be written to: {error.strerror}") from None

@@ -1,5 +1,6 @@
-"""Standard output that nobody reads any more, or that has no room: told once, whichever command writes."""
+"""Standard output that nobody reads any more, or that has no room; characters that it or standard error cannot show."""
 
+import codecs
 import io
 import os
 import sys
@@ -9,14 +10,33 @@ import click
 
 from harness.cli._input import BadInput
 
+_ANY_TEXT = "harness"  # the name under which Python knows `_encoded`
 CLOSED = 141  # the exit code of a program that SIGPIPE ends, as shells tell it
 
 
 def guard() -> None:
-    """From now on a write that fails ends the command: quietly on a closed pipe, else as bad input with the reason."""
+    """From now on a write that fails ends the command: quietly on a closed pipe, else as bad input with the reason.
+
+    Names of files are written as the bytes that they are, and other characters outside the encoding as escapes.
+    """
+    codecs.register_error(_ANY_TEXT, _encoded)
     if (out := sys.stdout) is not None:
         raw = io.BufferedWriter(_Stdout(out.fileno(), "w", closefd=False))
-        sys.stdout = io.TextIOWrapper(raw, out.encoding, out.errors, line_buffering=out.isatty())
+        sys.stdout = io.TextIOWrapper(raw, _encoding(out.encoding), _ANY_TEXT, line_buffering=out.isatty())
+    if isinstance(sys.stderr, io.TextIOWrapper):
+        sys.stderr.reconfigure(encoding=_encoding(sys.stderr.encoding), errors=_ANY_TEXT)
+
+
+def _encoding(declared: str) -> str:
+    """The encoding to write in: where a locale knows ASCII alone, its terminal shows UTF-8 all the same."""
+    return "utf-8" if codecs.lookup(declared).name == "ascii" else declared
+
+
+def _encoded(error: UnicodeError) -> tuple[str | bytes, int]:
+    try:
+        return codecs.lookup_error("surrogateescape")(error)
+    except UnicodeError:
+        return codecs.backslashreplace_errors(error)
 
 
 class _Stdout(io.FileIO):

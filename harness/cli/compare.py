@@ -4,9 +4,11 @@ from pathlib import Path
 
 import click
 
+from harness.cli._paths import PATH
+
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("directory", metavar="DIR", type=PATH)
 @click.option("--by", default="plant", show_default=True, metavar="KEY", help="The setting whose values are compared.")
 @click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
 @click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")

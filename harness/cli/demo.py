@@ -4,11 +4,13 @@ from pathlib import Path
 
 import click
 
+from harness.cli._paths import PATH
+
 EXPERIMENT = Path(__file__).with_name("demo.toml")
 
 
 @click.command()
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/demo"), show_default=True)
+@click.option("--out", type=PATH, default=Path("out/demo"), show_default=True)
 def demo(out: Path) -> None:
     """Fly the paper's first case, two laws on three aircraft, and compare.
 

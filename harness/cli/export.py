@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._paths import PATH, PATH_OR_ROW
+
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @click.command()
-@click.argument("what", metavar="DIR:KEY|FILE.rrd|DIR")
+@click.argument("what", metavar="DIR:KEY|FILE.rrd|DIR", type=PATH_OR_ROW)
 @click.option("--to", "kind", type=click.Choice(["csv", "parquet"]), required=True, help="Format of the table.")
 @click.option("--flight", metavar="NAME", help="Which flight of a FILE.rrd that holds several.")
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="The file.  [default: KEY, FILE or DIR, with the format's suffix]"
-)
+@click.option("--out", type=PATH, help="The file.  [default: KEY, FILE or DIR, with the format's suffix]")
 def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
     """Write the log of a flight, or the flights of a run, as a table.
 
@@ -33,21 +33,19 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
       harness export flight.rrd --to parquet --out flight.parquet
       harness export out/wind --to csv --out wind.csv
     """
-    import shutil
-
     from harness.cli._paths import writable
     from harness.files import replacing
     from harness.runs.results import export as write_table
 
     table, name = _table(what, flight)
     path = writable(out or Path(f"{name}.{kind}"))
-    with replacing(path) as partial:
+    with replacing(path) as partial, partial.open("wb") as file:
         if kind == "parquet" and Path(what).is_dir():
-            shutil.copyfile(write_table(Path(what)), partial)  # its columns say their units
+            file.write(write_table(Path(what)).read_bytes())  # its columns say their units
         elif kind == "csv":
-            table.to_csv(partial, index=False)
+            table.to_csv(file, index=False)
         else:
-            table.to_parquet(partial, index=False)
+            table.to_parquet(file, index=False)
     click.echo(f"{path}: {len(table)} rows, {len(table.columns)} columns")
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._paths import PATH, PATH_OR_ROW
+
 if TYPE_CHECKING:
     from harness.review.live import Live
     from harness.runs.recall import Recalled, RowAddress
@@ -14,9 +16,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("what", metavar="FILE|DIR:KEY")
+@click.argument("what", metavar="FILE|DIR:KEY", type=PATH_OR_ROW)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
-@click.option("--rrd", type=click.Path(path_type=Path), help="Write a Rerun recording to this file.")
+@click.option("--rrd", type=PATH, help="Write a Rerun recording to this file.")
 @click.option("--live", is_flag=True, help="Stream the flight to an open viewer, `harness view`.")
 @click.option(
     "--pace", type=click.FloatRange(0, min_open=True), help="Speed of --live, in times real time.  [default: 1]"

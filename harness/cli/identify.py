@@ -4,13 +4,13 @@ from pathlib import Path
 
 import click
 
+from harness.cli._paths import PATH
+
 
 @click.command()
 @click.argument("aircraft")
 @click.option("--airspeed", type=float, help="m/s. [default: the airspeed that the inner loop was tuned at]")
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/identify"), show_default=True
-)
+@click.option("--out", type=PATH, default=Path("out/identify"), show_default=True)
 def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     """Identify how an airframe follows a heading-rate command.
 
@@ -29,7 +29,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     from harness.cli._input import BadInput
     from harness.cli._paths import writable, writable_folder
     from harness.cli._progress import progress
-    from harness.files import replacing
+    from harness.files import write_text
     from harness.identification import identify as job
     from harness.identification.figures import bode_plot, step_plot
     from harness.identification.summary import summary_lines
@@ -62,6 +62,5 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
         click.echo(line)
     drawn = {path: plot(identification) for path, plot in plots.items()}
     for path, text in {file: document(airframe, [*others, identification.identified]), **drawn}.items():
-        with replacing(path) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(path, text)
     click.echo(f"parameters: {file}\nplots: {', '.join(map(str, plots))}")

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import click
 
 from harness.cli._stdout import guard
+from harness.neighbours import in_the_way
 
 
 class Entry(NamedTuple):
@@ -100,6 +101,9 @@ def main() -> None:
     """The entry point."""
     guard()
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
+    if message := in_the_way():
+        click.echo(message, err=True)
+        sys.exit(2)
     try:
         code = harness.main(standalone_mode=False)
     except click.ClickException as error:

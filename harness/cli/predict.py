@@ -4,9 +4,11 @@ from pathlib import Path
 
 import click
 
+from harness.cli._paths import PATH
+
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
 def predict(file: Path, overrides: tuple[str, ...]) -> None:
     """Predict the limit cycle of a flight without flying it.

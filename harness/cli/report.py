@@ -4,11 +4,13 @@ from pathlib import Path
 
 import click
 
+from harness.cli._paths import PATH
+
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="The HTML file. [default: DIR/report.html]")
-@click.option("--markdown", type=click.Path(path_type=Path), help="Write this Markdown file instead, without figures.")
+@click.argument("directory", metavar="DIR", type=PATH)
+@click.option("--out", type=PATH, help="The HTML file. [default: DIR/report.html]")
+@click.option("--markdown", type=PATH, help="Write this Markdown file instead, without figures.")
 @click.option("--by", default="plant", show_default=True, metavar="KEY", help="The setting whose values are compared.")
 @click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
 @click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
@@ -36,7 +38,7 @@ def report(
     from harness.cli._input import BadInput
     from harness.cli._paths import writable
     from harness.cli._progress import busy
-    from harness.files import replacing
+    from harness.files import write_text
     from harness.verdict import report as job
 
     if out is not None and markdown is not None:
@@ -47,6 +49,5 @@ def report(
     with busy("comparing and drawing"):
         comparison, origin = read_comparison(directory, overrides, by, baseline, where)
         text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
-        with replacing(path) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(path, text)
     click.echo(f"{path}")

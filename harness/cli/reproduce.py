@@ -5,9 +5,11 @@ from textwrap import fill
 
 import click
 
+from harness.cli._paths import PATH
+
 
 @click.command()
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/paper"), show_default=True)
+@click.option("--out", type=PATH, default=Path("out/paper"), show_default=True)
 @click.option("--sixdof", is_flag=True, help="Check the claims on the three 6-DOF airframes too: ten minutes more.")
 @click.option(
     "--workers", type=click.IntRange(1, 64), default=None, help="Number of processes; the results do not depend on it."
@@ -26,7 +28,7 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     """
     from harness.cli._paths import writable, writable_folder
     from harness.cli._progress import progress
-    from harness.files import replacing
+    from harness.files import write_text
     from harness.studies.paper import documents, job, ledger
     from harness.studies.paper import reproduce as numbers
     from harness.studies.paper.claims import CLAIMS
@@ -46,8 +48,7 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     if on_airframes:
         written[on_airframes] = documents.airframes_page(CLAIMS, everything.decisions)
     for path, text in written.items():
-        with replacing(path) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(path, text)
     for line in numbers.table(everything.numbers):
         click.echo(line)
     click.echo(f"\n{fill(f'Ours, with one thing read differently: {numbers.VARIANTS_IN_WORDS}.', 120)}")

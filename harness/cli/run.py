@@ -4,10 +4,12 @@ from pathlib import Path
 
 import click
 
+from harness.cli._paths import PATH
+
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="The folder of the results; required without --dry-run.")
+@click.argument("file", type=PATH)
+@click.option("--out", type=PATH, help="The folder of the results; required without --dry-run.")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--limit", type=click.IntRange(1), metavar="N", help="Fly the first N flights of the matrix only.")
 @click.option(

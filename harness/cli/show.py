@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._paths import PATH_OR_ROW
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -15,7 +17,7 @@ _MOST_LINES = 100
 
 
 @click.command()
-@click.argument("row", metavar="DIR|DIR:KEY")
+@click.argument("row", metavar="DIR|DIR:KEY", type=PATH_OR_ROW)
 @click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
 @click.option("--sort", metavar="COLUMN", help="Sort by a metric or setting; -COLUMN: the largest first.")
 @click.option("--columns", metavar="A,B", help="Print these metrics and settings.  [default: what varies, and metrics]")

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._paths import PATH, PATH_OR_ROW
+
 if TYPE_CHECKING:
     from harness.log import FlightLog
 
 
 @click.command()
-@click.argument("what", metavar="[DIR|DIR:KEY|FILE.rrd]", required=False)
+@click.argument("what", metavar="[DIR|DIR:KEY|FILE.rrd]", type=PATH_OR_ROW, required=False)
 @click.option(
     "--flight", "flights", multiple=True, metavar="KEY", help="A flight to show, up to 6; the first is the reference."
 )
 @click.option("--pair", metavar="KEY", help="Show this flight on every plant; kinematic is the reference.")
-@click.option(
-    "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write this recording; open no viewer."
-)
+@click.option("--save", type=PATH, metavar="FILE.rrd", help="Write this recording; open no viewer.")
 @click.option("--port", type=click.IntRange(1, 65535), default=9876, show_default=True, help="Port of the viewer.")
 def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Path | None, port: int) -> None:
     """Open flights in the Rerun viewer.

@@ -4,6 +4,7 @@ In this order: loading a model, trimming it, engaging its inner loop, flying it.
 """
 
 import math
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -82,8 +83,8 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_dt(step)  # before the model: its components keep the step they were made with
     try:
-        loaded = fdm.load_planet(str(_PLANTS / "planet.xml"), False) and fdm.load_model_with_paths(
-            airframe.name, str(airframe.parent), str(airframe), str(_INNER_LOOP), True
+        loaded = fdm.load_planet(_text(_PLANTS / "planet.xml"), False) and fdm.load_model_with_paths(
+            _text(Path(airframe.name)), _text(airframe.parent), _text(airframe), _text(_INNER_LOOP), True
         )
     except jsbsim.BaseError as error:
         raise ModelError(f"{aircraft.model(airframe)}: {' '.join(str(error).split())}") from error
@@ -97,6 +98,14 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
     for integrator in ("rate", "position"):
         write(fdm, f"simulation/integrator/{integrator}/rotational", _AB2)
     return fdm
+
+
+def _text(path: Path) -> str:
+    """The path as JSBSim takes it: text, whose bytes in UTF-8 are the name. Raises `ModelError`."""
+    try:
+        return os.fsencode(path).decode()
+    except UnicodeDecodeError:
+        raise ModelError(f"{path}: the name is not text in UTF-8, which JSBSim needs: rename the folder") from None
 
 
 def write(fdm: jsbsim.FGFDMExec, name: str, value: float) -> None:

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from functools import cache
 
 from harness.feasibility import feasibility_line, warnings
+from harness.files import as_text
 from harness.key import PHYSICS_VERSION, flight_key
 from harness.log import FlightLog
 from harness.log.metric import METRICS, measure
+from harness.markup import block
+from harness.markup import markdown as as_markdown
 from harness.provenance import packages
 from harness.review.styled import StyledFlight
 from harness.settings import document
@@ -20,14 +23,14 @@ _packages = cache(packages)
 
 def result_notes(flights: Sequence[StyledFlight], title: str, above: str, command: str) -> str:
     """The results, with a column per flight, and the command that repeats them; `above` is Markdown to precede them."""
-    parts = [f"# {title}"]
+    parts = [f"# {as_markdown(title)}"]
     parts += [above] if above else []
     names_by_line: dict[str, list[str]] = {}
     for flight in flights:
         for line in (feasibility_line(flight.log.flight), *(f"warning: {w}" for w in warnings(flight.log.flight))):
             names_by_line.setdefault(line, []).append(flight.name)
     of = {line: "" if len(names) == len(flights) else f" ({', '.join(names)})" for line, names in names_by_line.items()}
-    parts.append("\n".join(f"- {line}{of[line]}" for line in names_by_line))
+    parts.append("\n".join(f"- {as_markdown(f'{line}{of[line]}')}" for line in names_by_line))
     judged = [measure(flight.log) for flight in flights]
     wide = len(flights) < 3  # enough room for the meaning
     ends = [f"{f.log.outcome.value}{': ' if f.log.reason else ''}{f.log.reason}" for f in flights]
@@ -35,8 +38,8 @@ def result_notes(flights: Sequence[StyledFlight], title: str, above: str, comman
     rows = [["outcome", *ends, *(["how it ended"] if wide else [])]]
     rows += [[name, *(number(m[name]) for m in judged), *([METRICS[name].meaning] if wide else [])] for name in METRICS]
     parts.append(_table([head, *rows]))
-    parts += [f"Made by\n\n```\n{command}\n```"] if command else []
-    return "\n\n".join(parts)
+    parts += [f"Made by\n\n{block(command)}"] if command else []
+    return as_text("\n\n".join(parts))
 
 
 def settings_notes(flights: Sequence[StyledFlight]) -> str:
@@ -57,13 +60,13 @@ def settings_notes(flights: Sequence[StyledFlight]) -> str:
         differs = [
             [k, _word(first.get(k)), _word(other.get(k))] for k in {**first, **other} if first.get(k) != other.get(k)
         ]
-        parts.append(f"## {flight.name} beside {flights[0].name}")
+        parts.append(f"## {as_markdown(flight.name)} beside {as_markdown(flights[0].name)}")
         parts.append(_table([["setting", flights[0].name, flight.name], *differs]) if differs else "the same settings")
     parts += [
-        f"## Settings: {flights[0].name}",
+        f"## Settings: {as_markdown(flights[0].name)}",
         _table([["setting", "value"], *([k, _word(v)] for k, v in first.items())]),
     ]
-    return "\n\n".join(parts)
+    return as_text("\n\n".join(parts))
 
 
 def flight_json(log: FlightLog, place: int) -> str:
@@ -79,4 +82,5 @@ def _word(value: object) -> str:
 
 def _table(rows: Sequence[Sequence[str]]) -> str:
     """The first row holds the headings."""
-    return "\n".join(markdown(rows[0], rows[1:]))
+    head, *body = ([as_markdown(cell) for cell in row] for row in rows)
+    return "\n".join(markdown(head, body))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
+from harness.files import is_text
 from harness.log import COLUMNS, FlightLog
 from harness.plants.plant import Outcome
 from harness.review.seal import check
@@ -69,7 +70,9 @@ def _chosen(path: Path, names: list[str], flight: str | None) -> str:
 def _read(path: Path) -> dict[str, _Held]:
     check(path)  # first, for the OSError: Rerun raises RuntimeError for all that is wrong with a file
     try:
-        chunks = RrdReader(path).stream().filter(content="/runs/**").to_chunks()
+        with path.open("rb") as file:
+            name = str(path) if is_text(path) else f"/dev/fd/{file.fileno()}"  # Rerun knows no other names
+            chunks = RrdReader(name).stream().filter(content="/runs/**").to_chunks()
     except RuntimeError as error:
         raise ValueError(f"{path}: is not a complete recording: {error}") from error
     columns: dict[str, list[str]] = {}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from harness.files import replacing
+from harness.files import as_text, replacing
 from harness.log import COLUMNS, FlightLog
 from harness.review.differences import difference_plots
 from harness.review.lanes import COLOURS, Change, events, lanes, summary
@@ -122,14 +122,14 @@ def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: 
 
 def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     """The content of the file, made in memory: Rerun's own file sink never returns when the disk is full."""
-    flights = styled(logs)
+    flights = styled({as_text(name): log for name, log in logs.items()})
     content = content_of(flights, len(flights) if len(flights) > 1 else len(lanes(flights[0].log)))
     to = Recorder()
     memory = to.stream.memory_recording()
     to.stream.set_log_time_enabled(False)
     to.once("/notes/checksum", rr.TextDocument(PLACEHOLDER))
     to.layout(layout(content))
-    to.stream.send_recording_name(title)
+    to.stream.send_recording_name(as_text(title))
     log_surroundings(to, flights[0].log)
     log_target(to, max((flight.log for flight in flights), key=len))
     for flight in flights:

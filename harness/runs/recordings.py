@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from harness.files import make_folder
 from harness.log import FlightLog
 
 FOLDER = "flights"
@@ -13,7 +14,7 @@ def record(log: FlightLog, key: str, folder: Path) -> str:
 
     path = recording_path(folder, key)
     try:
-        path.parent.mkdir(exist_ok=True)
+        make_folder(path.parent)
         write_recording(path, {log.flight.plant: log}, key, command=f"harness fly {folder}:{key}")
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.files import replacing
+from harness.files import as_text, replacing
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.runs.store import reading, state
 from harness.settings.columns import by_column, is_setting
@@ -54,8 +54,8 @@ def export(folder: Path) -> Path:
         if _is_current(path, now):
             return path
         table = _declared(_table(journal)).replace_schema_metadata({_STATE: now})
-    with replacing(path) as partial:
-        pq.write_table(table, partial, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
+    with replacing(path) as partial, partial.open("wb") as file:
+        pq.write_table(table, file, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
     return path
 
 
@@ -65,7 +65,8 @@ def _is_current(path: Path, now: str) -> bool:
     import pyarrow.parquet as pq
 
     try:
-        return (pq.read_schema(path).metadata or {}).get(_STATE) == now.encode()
+        with path.open("rb") as file:  # Arrow takes a colon in a name for a scheme
+            return (pq.read_schema(file).metadata or {}).get(_STATE) == now.encode()
     except (OSError, pa.ArrowException):
         return False  # missing or damaged: the journal holds everything
 
@@ -76,7 +77,8 @@ def _exported(path: Path, now: str) -> "pa.Table | None":
     import pyarrow.parquet as pq
 
     try:
-        return pq.read_table(path) if _is_current(path, now) else None
+        with path.open("rb") as file:
+            return pq.read_table(file) if _is_current(path, now) else None
     except (OSError, pa.ArrowException):
         return None
 
@@ -120,7 +122,11 @@ def _columns(journal: sqlite3.Connection) -> Iterator[dict[str, list[Any]]]:
     while rows := cursor.fetchmany(_AT_ONCE):
         flat_rows = [_flat(row) for row in rows]
         names = dict.fromkeys(name for row in flat_rows for name in row)
-        yield {name: [row.get(name) for row in flat_rows] for name in names}
+        yield {name: [_cell(row.get(name)) for row in flat_rows] for name in names}
+
+
+def _cell(value: Any) -> Any:
+    return as_text(value) if isinstance(value, str) else value
 
 
 def _flat(row: tuple[Any, ...]) -> dict[str, Any]:

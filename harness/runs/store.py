@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from harness.error import HarnessError
+from harness.files import as_text, make_folder
 from harness.key import Version, content_hash
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
@@ -72,7 +73,7 @@ class Store:
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"{folder}: is a file, not a folder")
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
             self._lock = _locked(folder / LOCK)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be written: {error.strerror or error}") from None
@@ -168,7 +169,8 @@ class Store:
             if self._begun is None:
                 self._journal.execute("BEGIN IMMEDIATE")
                 self._begun = time.monotonic()
-            self._journal.execute(statement, tuple(values))
+            texts = (as_text(value) if isinstance(value, str) else value for value in values)
+            self._journal.execute(statement, tuple(texts))
         self.tick()
 
     def _all(self, statement: str, values: Iterable[object] = ()) -> list[Any]:

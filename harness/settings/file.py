@@ -13,6 +13,7 @@ import aircraft
 from autopilot.laws import LAWS
 from harness.checks import problems
 from harness.error import SettingsError
+from harness.files import file_name
 from harness.flight import Flight
 from harness.margins import Assess
 from harness.settings.check import checked
@@ -165,16 +166,22 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
     given = document.get("flight")
     schema = table.settings["flight"].table
     if isinstance(given, Mapping) and schema is not None:
-        document = {**document, "flight": at_own_speed(given, schema)}
+        document = {**document, "flight": at_own_speed(_with_airframe(given, folder), schema)}
     flight = checked(table, document, place)
     assert isinstance(flight, Flight)
     if flight.target.track is not None:
-        track = str(folder.absolute() / flight.target.track)
+        track = str(folder.absolute() / file_name(flight.target.track))
         flight = replace(flight, target=replace(flight.target, track=track))
-    beside_file = str(folder.absolute() / flight.aircraft)
-    if flight.aircraft and aircraft.is_folder(beside_file) and flight.aircraft not in aircraft.names():
-        flight = replace(flight, aircraft=beside_file)
     mistakes = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
     if mistakes:
         raise settings_error(mistakes, place)
     return flight
+
+
+def _with_airframe(flight: Mapping[str, object], folder: Path) -> Mapping[str, object]:
+    """A [flight] table whose airframe, if that is a folder beside the file, is named by its whole path."""
+    name = flight.get("aircraft")
+    if not isinstance(name, str) or not name or name in aircraft.names():
+        return flight
+    beside_file = str(folder.absolute() / file_name(name))
+    return {**flight, "aircraft": beside_file} if aircraft.is_folder(beside_file) else flight

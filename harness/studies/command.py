@@ -8,7 +8,7 @@ from typing import TypeVar
 import click
 
 from harness.error import HarnessError
-from harness.files import replacing
+from harness.files import make_folder, write_text
 
 Item = TypeVar("Item")
 
@@ -46,9 +46,8 @@ def _end(message: str, code: int) -> None:
 def write(folder: Path, texts: Mapping[str, str]) -> None:
     """Writes each text whole to the file of its name, and says where. OSError when a file cannot be written."""
     for name, text in texts.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        with replacing(folder / name) as partial:
-            partial.write_text(text, encoding="utf-8")
+        make_folder((folder / name).parent)
+        write_text(folder / name, text)
         click.echo(folder / name)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from harness.files import replacing
+from harness.files import replacing, write_text
 from harness.margins import Assess
 from harness.runs.comparable import flights_and_margins
 from harness.studies.command import out_option, run, write
@@ -374,13 +374,12 @@ def main(directory: Path, gains: Path, readme: Path | None, rows: Path | None, o
     text, block = page(flights, of_gains, assess, (str(directory), str(gains)))
     write(out, {"does_it_hold.md": text})
     if readme is not None:
-        with replacing(readme) as partial:
-            partial.write_text(in_readme(readme.read_text(encoding="utf-8"), block), encoding="utf-8")
+        write_text(readme, in_readme(readme.read_text(encoding="utf-8"), block))
         click.echo(readme)
     if rows is not None:
         for name, table in (("assumption_core", core(flights)), ("quiet_gains", of_gains)):
-            with replacing(rows / f"{name}.parquet") as partial:
-                rows_kept(table).to_parquet(partial, index=False)
+            with replacing(rows / f"{name}.parquet") as partial, partial.open("wb") as file:
+                rows_kept(table).to_parquet(file, index=False)
             click.echo(rows / f"{name}.parquet")
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.markup import latex
 from harness.settings.written import written
 from harness.verdict.answer import signed, unit_of
 from harness.verdict.comparison import Comparison
@@ -101,25 +102,14 @@ def _latex(comparison: Comparison) -> Iterator[str]:
     yield r"metric & unit & cell & difference & 95\,\% interval & verdict \\"
     for card in comparison.scorecards:
         yield r"\hline"
-        yield rf"\multicolumn{{6}}{{l}}{{{escaped(f'{card.aircraft}, {comparison.by} = {card.value}')}}} \\"
+        yield rf"\multicolumn{{6}}{{l}}{{{latex(f'{card.aircraft}, {comparison.by} = {card.value}')}}} \\"
         for judgement in card.judgements:
             if not judgement.has_margin:
                 continue
             cell = ", ".join(f"{axis} = {value}" for axis, value in judgement.at.items())
             between = "--" if math.isnan(judgement.low) else f"$[{signed(judgement.low)}, {signed(judgement.high)}]$"
-            cells = (escaped(judgement.column), escaped(unit_of(judgement.column)), escaped(cell),
+            cells = (latex(judgement.column), latex(unit_of(judgement.column)), latex(cell),
                      f"${signed(judgement.difference)}$", between, str(judgement.word))  # fmt: skip
             yield " & ".join(cells) + r" \\"
     yield r"\hline"
     yield r"\end{tabular}"
-
-
-_LATEX = {
-    "\\": r"\textbackslash{}", "_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}",
-    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
-}  # fmt: skip
-
-
-def escaped(text: str) -> str:
-    """The text with every character that LaTeX would take for its own."""
-    return "".join(_LATEX.get(letter, letter) for letter in text)
