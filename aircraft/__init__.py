@@ -96,7 +96,7 @@ def _read(file: Path) -> dict[str, Any]:
         return _parsed(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise AirframeError(f"{file}: {error.strerror}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise AirframeError(f"{file}: not valid TOML: {error}") from None
 
 

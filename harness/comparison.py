@@ -11,6 +11,7 @@ from harness.margins import Assess
 from harness.runs.comparable import flights_and_margins
 from harness.runs.results import as_results
 from harness.runs.store import last_run
+from harness.toml_text import shown
 from harness.verdict.comparison import Comparison, compare_flights
 from harness.verdict.pairs import CompareError, settings_of
 
@@ -81,10 +82,10 @@ def chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
             if value not in there:
                 known = ", ".join(map(str, there[:20])) + (", ..." if len(there) > 20 else "")
                 hint = did_you_mean(value, map(str, there))
-                raise CompareError(f"where: no flight has {key} = {value!r}{hint}; there is {known}")
+                raise CompareError(f"where: no flight has {key} = {shown(value)}{hint}; there is {known}")
         flights = flights[column.isin(values)]
         if not len(flights):
-            raise CompareError(f"where: no flight is left that has {dict(where)}")
+            raise CompareError(f"where: no flight is left that has {shown(where)}")
     return flights.reset_index(drop=True)
 
 

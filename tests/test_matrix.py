@@ -190,7 +190,7 @@ MISTAKES = [
     ('[matrix]\n"start.heading_deg" = [{ start = 0, count = 3 }]\n', "has the keys count, start in a list, must be"),
     (
         '[matrix]\n"wind.steady_mps" = { speed_mps = 2, towards_deg = { uniform = [[0], [1]] } }\n',
-        "m.toml:8: matrix.wind.steady_mps: towards_deg is {'uniform': [[0], [1]]}, must be numbers, { uniform",
+        "m.toml:8: matrix.wind.steady_mps: towards_deg is { uniform = [[0], [1]] }, must be numbers, { uniform",
     ),
     ('[matrix]\n"seed, plant" = [[1, "sixdof"], [2]]\n', "element 2 is [2], must be a list of 2: seed, plant"),
     (

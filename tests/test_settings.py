@@ -312,3 +312,37 @@ def test_a_length_may_be_the_way_flown_in_some_seconds() -> None:
     assert flight.start.position == (-375.0, 200.0)
     with pytest.raises(SettingsError, match=r'law.standoff_m: is "15 m", must be a number'):
         flight_from_document({**settings, "law": {"name": "smc", "standoff_m": "15 m"}})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"[{'.'.join('a' * 700)}]\n",
+        f"{'.'.join('a' * 3000)} = 1\n",
+        f"x = {'[' * 3000}{']' * 3000}\n",
+        f"x = {'{a=' * 99}1{'}' * 99}\n",
+    ],
+)
+def test_tables_or_lists_nested_too_deep_are_told(write: Write, text: str) -> None:
+    (told,) = mistakes(write(text))
+    assert told == "a.toml: cannot be used: it has more than 30 tables or lists within one another"
+
+
+@pytest.mark.parametrize("value", ["[" * 3000, "[" * 3000 + "]" * 3000, "{a=" * 3000, "9" * 5000, "1\n[assess]"])
+def test_a_value_of_the_command_line_that_is_no_toml_is_a_word_told_by_its_beginning(write: Write, value: str) -> None:
+    (told,) = mistakes(write(SHORTEST), f"duration_s={value}")
+    assert told.startswith(f"--set duration_s={' '.join(value.split())[:46]}")
+    assert "must be a number" in told
+    assert len(told) < 250
+
+
+def test_a_key_of_the_command_line_has_a_depth_as_well(write: Write) -> None:
+    (told,) = mistakes(write(SHORTEST), f"{'.'.join('a' * 3000)}=1")
+    assert told.endswith("...: the key must be a dotted name below [flight], as in law.gains")
+
+
+def test_messages_show_values_as_a_file_has_them(write: Write) -> None:
+    text = SHORTEST.replace('"kinematic"', "2020-01-01\nduration_s = [07:32:00, true]\nseed = { a = inf, b = 'x' }")
+    assert [line.split(": ", 2)[2].split(", must")[0] for line in mistakes(write(text))] == [
+        "is 2020-01-01", "is [07:32:00, true]", 'is { a = inf, b = "x" }',
+    ]  # fmt: skip

@@ -58,14 +58,11 @@ def wanted(where: tuple[str, ...]) -> dict[str, object]:
 
 def _value(text: str | None) -> object:
     """A value as a settings file would have it: a number, a list or a word; None for none."""
-    import tomllib
+    from harness.toml_text import value_of
 
     if text is None:
         return None
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text.strip()
+    value = value_of(text)
     if isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     return tuple(value) if isinstance(value, list) else value

@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from harness.plants.coordinated import AirspeedHold, Coordinated
 from harness.plants.lagged import Lagged
 from harness.plants.plant import PlantError
 from harness.plants.response import Response
+from harness.toml_text import tables_of
 
 _NEAR = 0.05  # relative: an identification holds for airspeeds this close to its own
 
@@ -85,9 +85,9 @@ def read(airframe: Path) -> list[Identified]:
     if not file.is_file():
         return []
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))["at"]
+        tables = tables_of(file.read_text(encoding="utf-8"))["at"]
         return sorted((_from(table) for table in tables), key=lambda entry: entry.airspeed)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError, ArithmeticError) as error:
         again = f"run harness identify {airframe_argument(airframe)}"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
 
@@ -95,7 +95,7 @@ def read(airframe: Path) -> list[Identified]:
 def is_stale(airframe: Path) -> bool:
     """Whether the airframe's model or its inner loop has changed since it was identified. OSError without the file."""
     text = aircraft.identified(airframe).read_text(encoding="utf-8")
-    return tomllib.loads(text).get("model") != model_digest(airframe)
+    return tables_of(text).get("model") != model_digest(airframe)
 
 
 def model_digest(airframe: Path) -> str:

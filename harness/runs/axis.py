@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from harness.toml_text import shown
+
 FORMS = (
     "a list, { start, count }, { from, to, step }, { speed_mps, towards_deg }, { uniform = [a, b] } or "
     "{ normal = [mean, deviation] }"
@@ -135,7 +137,7 @@ def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -
             raise ValueError("keys that vary together need a list of lists, one value for each key")
         return Axis(keys, _form(value), [line(0)])
     if lists and not isinstance(value, list):
-        raise ValueError(f"is {value!r}, must be {FORMS}")
+        raise ValueError(f"is {shown(value)}, must be {FORMS}")
     values: list[Any] = value if lists and isinstance(value, list) else [value]
     if not values:
         raise ValueError("the list is empty, must have at least one value")
@@ -144,7 +146,7 @@ def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -
         return Axis(keys, [_element(element) for element in values], lines)
     for i, element in enumerate(values):
         if not (isinstance(element, list) and len(element) == len(keys)):
-            raise ValueError(f"element {i + 1} is {element!r}, must be a list of {len(keys)}: {name}")
+            raise ValueError(f"element {i + 1} is {shown(element)}, must be a list of {len(keys)}: {name}")
     return Axis(keys, [[_element(of_key) for of_key in element] for element in values], lines)
 
 
@@ -187,7 +189,7 @@ def _vectors(table: Mapping[str, Any]) -> Sequence[Any]:
         return [_towards(speed, angle) for speed in speeds for angle in (angles if speed else angles[:1])]
     if set(directions) not in ({"uniform"}, {"normal"}) or isinstance((drawn := _draw(directions)).a, list):
         forms = "{ uniform = [a, b] } or { normal = [mean, deviation] }"
-        raise ValueError(f"towards_deg is {dict(directions)!r}, must be numbers, {forms}")
+        raise ValueError(f"towards_deg is {shown(directions)}, must be numbers, {forms}")
     return [replace(drawn, length=speed) if speed else _towards(0.0, 0.0) for speed in speeds]
 
 
@@ -211,7 +213,7 @@ def _range(table: Mapping[str, Any]) -> Sequence[float]:
 def _integer(table: Mapping[str, Any], name: str) -> int:
     value = table[name]
     if not isinstance(value, int) or isinstance(value, bool):
-        raise ValueError(f"{name} is {value!r}, must be a whole number")
+        raise ValueError(f"{name} is {shown(value)}, must be a whole number")
     return value
 
 
@@ -223,14 +225,14 @@ def _numbers(table: Mapping[str, Any], name: str) -> list[float]:
     value = table[name]
     values = value if isinstance(value, list) else [value]
     if not values:
-        raise ValueError(f"{name} is {value!r}, must be a number, or a list of numbers")
+        raise ValueError(f"{name} is {shown(value)}, must be a number, or a list of numbers")
     return [_finite(v, name) for v in values]
 
 
 def _two_numbers(table: Mapping[str, Any], kind: str) -> tuple[Any, Any]:
     """Two numbers, or two vectors of equal length."""
     value = table[kind]
-    wrong = f"{kind} is {value!r}, must be two numbers, or two lists of equal length"
+    wrong = f"{kind} is {shown(value)}, must be two numbers, or two lists of equal length"
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError(wrong)
     a, b = value
@@ -239,11 +241,11 @@ def _two_numbers(table: Mapping[str, Any], kind: str) -> tuple[Any, Any]:
     for number in (*a, *b) if isinstance(a, list) else (a, b):
         _finite(number, kind)
     if kind == "normal" and any(deviation < 0 for deviation in (b if isinstance(b, list) else [b])):
-        raise ValueError(f"the deviation is {b!r}, must be >= 0")
+        raise ValueError(f"the deviation is {shown(b)}, must be >= 0")
     return a, b
 
 
 def _finite(value: object, name: str) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        raise ValueError(f"{name} is {value!r}, must be a finite number")
+        raise ValueError(f"{name} is {shown(value)}, must be a finite number")
     return float(value)

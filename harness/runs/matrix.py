@@ -13,6 +13,7 @@ from harness.runs.axis import Axis, Draw, axis, flattened, is_axis
 from harness.settings import Experiment, SettingsError, SettingsFile, flight_from_document, put
 from harness.settings.keys import is_list
 from harness.settings.toml_locator import Key, nearest_line
+from harness.toml_text import shortened, shown
 from harness.world.randomness import stream
 
 
@@ -179,7 +180,7 @@ def _given(file: SettingsFile, mistakes: list[str]) -> tuple[SettingsFile, Mappi
         try:
             axes.append(axis(name, given[name], lists=True, line=lambda _: 0))
         except ValueError as error:
-            mistakes.append(f"--set {text}: {error}")
+            mistakes.append(f"--set {shortened(text)}: {error}")
     return replace(file, document=document), given, axes
 
 
@@ -232,8 +233,8 @@ def _exclusion(
             known = ", ".join(sorted(choices)) or "none"
             mistakes.append(f"{place}: is not an axis of [matrix] with listed values, must be one of: {known}")
         elif value not in choices[name]:
-            listed = ", ".join(map(str, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
-            mistakes.append(f"{place}: is {value!r}, which excludes nothing, must be one of {listed}")
+            listed = ", ".join(map(shown, choices[name][:8])) + (", ..." if len(choices[name]) > 8 else "")
+            mistakes.append(f"{place}: is {shown(value)}, which excludes nothing, must be one of {listed}")
         else:
             checked[name] = value
     return checked

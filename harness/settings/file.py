@@ -24,6 +24,7 @@ from harness.settings.mistake import Mistake, Place, Places, settings_error
 from harness.settings.speed import at_own_speed
 from harness.settings.table import TableSchema, schema_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
+from harness.toml_text import shortened, tables_of, value_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,7 @@ class SettingsFile:
     def _place(self, key: Key) -> Place:
         for length in range(len(key), 0, -1):
             if key[:length] in self.overrides:
-                return Place(sys.maxsize, f"--set {' '.join(self.overrides[key[:length]].split())}")
+                return Place(sys.maxsize, f"--set {shortened(self.overrides[key[:length]])}")
         line = nearest_line(self.lines, key)
         return Place(line, f"{self.path}:{line}")
 
@@ -97,14 +98,14 @@ def read_settings(path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
 def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> SettingsFile:
     """Like `read_settings`, from the text of a file, as a store keeps it; `path` is for messages."""
     try:
-        document = tomllib.loads(text)
+        document = tables_of(text)
     except tomllib.TOMLDecodeError as error:
         what, _, at = str(error).rpartition(" (at ")
         located = re.match(r"line (\d+)", at)
         line = located[1] if located else text.count("\n") + 1  # "at end of document"
         raise SettingsError([f"{path}:{line}: not valid TOML: {what}"]) from None
-    except (ValueError, RecursionError) as error:  # a number with too many digits, arrays nested too deep
-        raise SettingsError([f"{path}: not valid TOML: {error}"]) from None
+    except ValueError as error:  # a number with too many digits, tables nested too deep
+        raise SettingsError([f"{path}: cannot be used: {error}"]) from None
     return overridden(SettingsFile(path, text, document, key_lines(text), {}), overrides)
 
 
@@ -116,12 +117,12 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
     for override in overrides:
         name, equals, value = override.partition("=")
         if not equals:
-            wrong.append(f"--set {override}: must be KEY=VALUE, as in law.gains=paper_1")
+            wrong.append(f"--set {shortened(override)}: must be KEY=VALUE, as in law.gains=paper_1")
             continue
         try:
-            key = put(document, name, _parsed(value))
+            key = put(document, name, value_of(value))
         except SettingsError as error:
-            wrong.append(f"--set {override}: {error}")
+            wrong.append(f"--set {shortened(override)}: {error}")
             continue
         merged = {k: o for k, o in merged.items() if k[: len(key)] != key}  # without those that it replaces
         merged[key] = override
@@ -147,13 +148,6 @@ def _text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise SettingsError([f"{path}:{line}: not text in UTF-8"]) from None
-
-
-def _parsed(value: str) -> object:
-    try:
-        return tomllib.loads(f"v = {value}")["v"]
-    except ValueError:
-        return value.strip()
 
 
 def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flight:

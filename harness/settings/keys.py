@@ -7,6 +7,7 @@ from harness.error import SettingsError
 from harness.settings.experiment import flight_table
 from harness.settings.table import TableSchema, schema_of
 from harness.settings.toml_locator import Key, dotted
+from harness.toml_text import DEEPEST
 
 
 def file_key(name: str) -> Key:
@@ -42,7 +43,7 @@ def put(document: dict[str, Any], name: str, value: object) -> Key:
     key.
     """
     words = [word.strip() for word in name.strip().removeprefix("flight.").split(".")]
-    if not all(words):
+    if not all(words) or len(words) > DEEPEST:
         raise SettingsError(["the key must be a dotted name below [flight], as in law.gains"])
     key = tuple(words) if words[0] == "assess" else ("flight", *words)
     table = document

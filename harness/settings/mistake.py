@@ -1,6 +1,5 @@
 """A mistake in the settings and its message: place, key, what is wrong, what is allowed, did you mean."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple, get_args, get_origin
@@ -11,6 +10,7 @@ from pydantic_core import ErrorDetails
 from harness.error import SettingsError, did_you_mean
 from harness.settings.table import Setting, TableSchema
 from harness.settings.toml_locator import Key, dotted
+from harness.toml_text import shown
 
 LARGEST = 1e9  # in file units: the largest size of any number
 
@@ -68,12 +68,12 @@ def mistake(table: TableSchema, document: Any, details: ErrorDetails) -> Mistake
         expected = expected.replace("number", "finite number")
     if details["type"] == "too_large":
         expected += f", of {LARGEST:g} at most in size"
-    return Mistake(key, f"is {_text(value)}, must be {expected}{did_you_mean(value, _choices(setting))}")
+    return Mistake(key, f"is {shown(value)}, must be {expected}{did_you_mean(value, _choices(setting))}")
 
 
 def _expected(setting: Setting) -> str:
     if choices := _choices(setting):
-        texts = [_text(choice) for choice in choices]
+        texts = [shown(choice) for choice in choices]
         return " or ".join(texts) if len(texts) < 3 else f"one of {', '.join(texts)}"
     if setting.kind is bool:
         return "true or false"
@@ -90,8 +90,3 @@ def _expected(setting: Setting) -> str:
 
 def _choices(setting: Setting) -> tuple[str, ...]:
     return get_args(setting.kind) if get_origin(setting.kind) is Literal else ()
-
-
-def _text(value: object) -> str:
-    text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
-    return text if len(text) <= 60 else f"{text[:57]}..."

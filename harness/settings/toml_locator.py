@@ -6,6 +6,8 @@ import tomllib
 from bisect import bisect_left
 from collections.abc import Mapping
 
+from harness.toml_text import shortened
+
 Key = tuple[str | int, ...]  # ("flight", "target", "segments", 0): tables by key, elements of arrays by index
 
 _PART = r"""(?:[A-Za-z0-9_-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*')"""
@@ -70,7 +72,7 @@ def nearest_line(lines: Mapping[Key, int], key: Key) -> int:
 
 def dotted(key: Key) -> str:
     """The key as messages show it, with dots; parts that TOML would quote are quoted."""
-    return ".".join(str(k) if re.fullmatch(r"[\w-]+", str(k), re.ASCII) else json.dumps(k) for k in key)
+    return ".".join(shortened(str(k) if re.fullmatch(r"[\w-]+", str(k), re.ASCII) else json.dumps(k)) for k in key)
 
 
 def _names(key: str) -> list[str]:
