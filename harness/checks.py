@@ -22,45 +22,55 @@ class Problem(NamedTuple):
 
     name: str
     message: str
+    others: tuple[str, ...] = ()  # the other fields that make it one
 
 
-def try_start(flight: Flight) -> None:
-    """Starts the flight's plant in the steady wind. Raises `PlantError` when it cannot fly there."""
-    plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
+_OF_PLANT = ("plant", "aircraft", "step", "start.airspeed", "inner_loop.rate_trim")
+
+
+def start_problems(flight: Flight) -> list[Problem]:
+    """Why the flight cannot start, which is tried in the steady wind. Of its airframe `problems` tells."""
+    if _airframe_problems(flight):
+        return []
+    try:
+        plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
+    except PlantError as error:
+        return [Problem(error.key, str(error), (*_OF_PLANT, "start.altitude", "wind.steady"))]
+    return []
 
 
 def problems(flight: Flight) -> list[Problem]:
     """All mistakes that involve more than one field; empty for a flight that can be simulated."""
     mistakes = []
     for name, period, unit_name, unit in (
-        ("guidance_period", flight.guidance_period, "step_s", flight.step),
-        ("duration", flight.duration, "guidance_period_s", flight.guidance_period),
+        ("guidance_period", flight.guidance_period, "step", flight.step),
+        ("duration", flight.duration, "guidance_period", flight.guidance_period),
     ):
         if not _is_multiple(period, unit):
-            mistakes.append(Problem(name, f"{period:g} s is not a whole multiple of {unit_name}, {unit:g} s"))
+            not_multiple = f"{period:g} s is not a whole multiple of {unit_name}_s, {unit:g} s"
+            mistakes.append(Problem(name, not_multiple, (unit_name,)))
             break
-    for what, period, most in (
-        ("guidance periods", flight.guidance_period, MOST_PERIODS),
-        ("steps", flight.step, MOST_STEPS),
+    for what, field, period, most in (
+        ("guidance periods", "guidance_period", flight.guidance_period, MOST_PERIODS),
+        ("steps", "step", flight.step, MOST_STEPS),
     ):
         if not mistakes and flight.duration / period > most:
             many = f"takes {flight.duration / period:.3g} {what} of {period:g} s, must be {most:g} at most"
-            mistakes.append(Problem("duration", many))
+            mistakes.append(Problem("duration", many, (field,)))
     sample, guidance = flight.estimator.period, flight.guidance_period
     if flight.estimator.filters:
         if not _is_multiple(sample, flight.step):
             not_multiple = f"{sample:g} s is not a whole multiple of step_s, {flight.step:g} s"
-            mistakes.append(Problem("estimator.period", not_multiple))
+            mistakes.append(Problem("estimator.period", not_multiple, ("estimator.kind", "step")))
         elif not (_is_multiple(sample, guidance) or _is_multiple(guidance, sample)):
             neither = (
                 f"{sample:g} s is neither a whole multiple nor a whole fraction of guidance_period_s, {guidance:g} s"
             )
-            mistakes.append(Problem("estimator.period", neither))
+            mistakes.append(Problem("estimator.period", neither, ("estimator.kind", "guidance_period")))
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:
-        mistakes.append(
-            Problem("wind.steady", f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s")
-        )
+        strong = f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s"
+        mistakes.append(Problem("wind.steady", strong, ("start.airspeed",)))
     mistakes += [
         Problem(f"wind.gusts.{i}.to", f"{gust.to:g} s, must be after from_s, {gust.from_:g} s")
         for i, gust in enumerate(flight.wind.gusts)
@@ -69,7 +79,7 @@ def problems(flight: Flight) -> list[Problem]:
     altitude = flight.start.altitude
     if flight.wind.turbulence != "none" and not LOWEST <= altitude <= HIGHEST:
         holds = f"the low-altitude model holds from {LOWEST:g} to {HIGHEST:g} m; the flight starts at {altitude:g} m"
-        mistakes.append(Problem("wind.turbulence", holds))
+        mistakes.append(Problem("wind.turbulence", holds, ("start.altitude",)))
     mistakes += _target_problems(flight)
     mistakes += _airframe_problems(flight)
     return mistakes
@@ -98,7 +108,7 @@ def _airframe_problems(flight: Flight) -> list[Problem]:
     try:
         plant_of(flight)
     except PlantError as error:
-        return [Problem(error.key, str(error))]
+        return [Problem(error.key, str(error), _OF_PLANT)]
     return []
 
 
@@ -119,7 +129,7 @@ def _target_problems(flight: Flight) -> list[Problem]:
             return [*mistakes, Problem("target.track", str(error))]
         if flight.duration > end * (1.0 + 1e-9):
             ends = f"{target.track} ends at {end:g} s, must last as long as duration_s, {flight.duration:g} s"
-            mistakes.append(Problem("target.track", ends))
+            mistakes.append(Problem("target.track", ends, ("duration",)))
         return mistakes
     mistakes = [
         Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
@@ -129,7 +139,7 @@ def _target_problems(flight: Flight) -> list[Problem]:
     slowest = min(leg.speed for leg in target.legs())
     if slowest < -1e-9:
         slow = f"slow the target down to {slowest:g} m/s, must keep its speed at or above 0"
-        mistakes.append(Problem("target.segments", slow))
+        mistakes.append(Problem("target.segments", slow, ("target.speed",)))
     return mistakes
 
 

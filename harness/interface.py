@@ -139,7 +139,7 @@ def run(
         raise ValueError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
     path, out = Path(path), Path(out)
     workers = (os.cpu_count() or 1) if workers is None else workers
-    matrix = read_matrix(read_settings(path, overrides))
+    matrix = read_matrix(read_settings(path, overrides), draft=True)
     for _ in survey(matrix, limit, positions_done(matrix, out, retry_failed=retry_failed)):
         pass  # every mistake is found before the first flight
     options = Options(workers=workers, limit=limit, log=log, retry_failed=retry_failed, timeout=timeout)

@@ -265,7 +265,10 @@ def test_of_several_measurements_in_a_guidance_period_all_count() -> None:
 def test_a_measurement_period_must_fit_the_guidance_period_and_the_step() -> None:
     def told(period: float, guidance_period: float, kind: Literal["truth", "ekf"] = "ekf") -> list[str]:
         estimator = replace(PAPER, period=period, kind=kind)
-        return [": ".join(p) for p in problems(replace(EKF, estimator=estimator, guidance_period=guidance_period))]
+        return [
+            f"{p.name}: {p.message}"
+            for p in problems(replace(EKF, estimator=estimator, guidance_period=guidance_period))
+        ]
 
     assert told(0.5, 0.05) == told(0.1, 0.5) == told(0.5, 0.5) == told(0.5, 0.2, "truth") == []
     assert told(0.5, 0.2) == [

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from harness.runs.matrix import Matrix, read_matrix
+from harness.runs.run import run
 from harness.runs.survey import survey
 from harness.settings import SettingsError, document, read_settings
-from tests.builders import DOCS, write
+from tests.builders import DOCS, HERE, write
 
 FLIGHT = """\
 [flight]
@@ -259,3 +260,81 @@ def test_the_guides_matrix_has_the_flights_that_its_comments_say(tmp_path: Path)
     assert len(m) == plants * seeds * limits * winds * laws - limits * winds * laws + 3
     *_, found = survey(m, limit=40)
     assert found.flights == 40
+
+
+FULL_OF_MISTAKES = """\
+titel = "x"
+question = 3
+[flight]
+duration_s = "long"
+wnid = 3
+[flight.law]
+name = "nftms"
+standof_m = 3
+max_heading_rate_deg_s = -5
+[flight.start]
+airspeed_mps = 7
+[flight.wind]
+steady_mps = [13.0, 0.0]
+gusts = [
+  { from_s = 5, to_s = 3, velocity_mps = [1, 1, 1] },
+  { from_s = "a", to_s = 3, velocity_mps = [1, 1, 1] },
+]
+[flight.estimator]
+kind = "ekf"
+period_s = 0.0521
+[matrix]
+plant = ["sixdof", "kinmatic"]
+seed = []
+"law.gains" = ["paper", "papr"]
+"law.gian" = []
+[[exclude]]
+seed = 3
+[[exclude]]
+plant = "lagged"
+[assess]
+range_error_margn_m = 3
+sideslip_deg = -1
+"""
+
+
+def test_every_mistake_of_a_file_is_told_at_once_in_its_order_and_nothing_that_follows_from_one(tmp_path: Path) -> None:
+    file = write(tmp_path / "full.toml", FULL_OF_MISTAKES)
+    with pytest.raises(SettingsError) as caught:
+        list(survey(read_matrix(read_settings(file), draft=True)))
+    told = [line.removeprefix(f"{file}:") for line in caught.value.lines]
+    assert [": ".join(line.split(": ")[:2]) for line in told] == [
+        "1: titel",
+        "2: question",
+        "4: flight.duration_s",
+        "5: flight.wnid",
+        "7: flight.law.name",
+        "8: flight.law.standof_m",
+        "9: flight.law.max_heading_rate_deg_s",
+        "11: flight.start.airspeed_mps",  # no level trim
+        "13: flight.wind.steady_mps",  # not below the airspeed
+        "15: flight.wind.gusts.0.to_s",  # before from_s
+        "16: flight.wind.gusts.1.from_s",
+        "20: flight.estimator.period_s",  # not a multiple of step_s
+        "22: flight.plant",
+        "23: matrix.seed",  # empty
+        "24: flight.law.gains",
+        "25: matrix.law.gian",  # empty
+        "25: flight.law.gian",  # unknown
+        "29: exclude.plant",
+        "31: assess.range_error_margn_m",
+        "32: assess.sideslip_deg",
+    ]
+    with pytest.raises(SettingsError, match="titel"):
+        list(run(read_matrix(read_settings(file), draft=True), tmp_path / "out", HERE))
+
+
+def test_a_setting_that_is_wrong_makes_no_other_one_wrong(matrix: Read) -> None:
+    text = '[flight.start]\nairspeed_mps = "fast"\n[flight.wind]\nsteady_mps = [14, 0]\n[matrix]\nplant = []\n'
+    with pytest.raises(SettingsError) as caught:
+        matrix(text)
+    assert caught.value.lines[0].endswith("matrix.plant: the list is empty, must have at least one value")
+    with pytest.raises(SettingsError) as caught:
+        list(survey(matrix(text.replace("plant = []", "seed = [1, 2]"))))
+    (airspeed,) = caught.value.lines
+    assert 'flight.start.airspeed_mps: is "fast"' in airspeed

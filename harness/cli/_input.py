@@ -35,19 +35,12 @@ def read_file(path: Path, overrides: tuple[str, ...]) -> SettingsFile:
 
 def flight_of(file: SettingsFile) -> Flight:
     """The flight that a file describes. Its start is tried: a flight that cannot start raises `BadInput`."""
-    from harness.checks import try_start
-    from harness.plants.plant import PlantError
     from harness.settings import SettingsError
 
     try:
-        flight = file.flight()
+        return file.flight(started=True)
     except SettingsError as error:
         raise BadInput(str(error)) from None
-    try:
-        try_start(flight)
-    except PlantError as error:
-        raise BadInput(f"{file.locate(error.key)}: {error}") from None
-    return flight
 
 
 def typed() -> str:

@@ -27,14 +27,16 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
     from harness.settings import SettingsError
 
     settings = read_file(file, overrides)
-    if settings.document.get("matrix"):
-        try:
-            matrix = read_matrix(settings)
-            print_survey(matrix, surveyed(matrix), 0)
-        except SettingsError as error:
-            raise BadInput(str(error)) from None
+    matrix = read_matrix(settings, draft=True)
+    try:
+        size = surveyed(matrix)
+    except SettingsError as error:
+        raise BadInput(str(error)) from None
+    if size.flights != 1:
+        print_survey(matrix, size, 0)
     else:
-        flight = flight_of(settings)
+        (combination,) = matrix.combinations()
+        flight = flight_of(matrix.located(combination))
         click.echo(feasibility_line(flight))
         for warning in warnings(flight):
             click.echo(f"warning: {warning}", err=True)

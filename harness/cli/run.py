@@ -68,7 +68,7 @@ def run(
         raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
     workers = (os.cpu_count() or 1) if workers is None else workers
     try:
-        matrix = read_matrix(read_settings(file, overrides))
+        matrix = read_matrix(read_settings(file, overrides), draft=True)
         done = positions_done(matrix, out, retry_failed=retry is not None) if out else frozenset[int]()
         size = surveyed(matrix, limit, done)
         if out is not None and not dry_run:

@@ -1,9 +1,9 @@
 """A matrix of flights: the product of axes over keys of [flight], expanded one flight at a time, in a fixed order."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from harness.key import hashed
 from harness.runs.axis import Axis, Draw, axis, flattened, is_axis
 from harness.settings import Experiment, SettingsError, SettingsFile, flight_from_document, put
 from harness.settings.keys import is_list
+from harness.settings.mended import TOLD
 from harness.settings.toml_locator import Key, nearest_line
 from harness.toml_text import shortened, shown
 from harness.world.randomness import stream
@@ -45,6 +46,8 @@ class Matrix:
     blocks: Sequence[Block]
     excluded: Sequence[Mapping[str, object]]
     given: Mapping[str, object]  # axes of the command line: the values as `--set` gives them
+    mistakes: Sequence[str] = ()  # only in a draft
+    mistaken: Mapping[str, int] = field(default_factory=dict)  # the keys of their axes, each with its line
 
     @property
     def positions(self) -> int:
@@ -121,50 +124,65 @@ class Matrix:
             return group
         raise IndexError(position)
 
-    def flight(self, combination: Combination) -> Flight:
-        """The flight of a combination. Raises `SettingsError` with the line of each value that is wrong."""
+    def flight(self, combination: Combination, *, started: bool = False) -> Flight:
+        """The flight of a combination. Raises `SettingsError` with the line of each value that is wrong.
+
+        With `started` the error also says whether the flight could start, were it not for its other mistakes.
+        """
         try:
             return flight_from_document(self._document(combination)["flight"], self.file.path.parent)
         except SettingsError:
-            return self.located(combination).flight()  # raises the same, with its place
+            return self.located(combination).flight(started=started)  # raises the same, with its place
 
     def located(self, combination: Combination) -> SettingsFile:
         """The combination as a settings file of one flight, in which each value has its line in the matrix."""
-        lines: dict[Key, int] = {("flight", *key.split(".")): line for key, line in combination.lines.items()}
+        values = {**self.mistaken, **combination.lines}
+        lines: dict[Key, int] = {("flight", *key.split(".")): line for key, line in values.items()}
         return replace(self.file, document=self._document(combination), lines={**self.file.lines, **lines})
 
     def _document(self, combination: Combination) -> dict[str, Any]:
         document: dict[str, Any] = {"flight": deepcopy(_table(self.file.document, "flight"))}
-        for key, value in combination.values.items():
-            put(document, key, value)
+        for key, value in {**dict.fromkeys(self.mistaken, TOLD), **combination.values}.items():
+            try:
+                put(document, key, value)
+            except SettingsError as error:
+                at = {**self.mistaken, **combination.lines}[key]
+                raise SettingsError([f"{self.file.path}:{at}: matrix.{key}: {error}"]) from None
         return document
 
 
-def read_matrix(file: SettingsFile) -> Matrix:
+def read_matrix(file: SettingsFile, *, draft: bool = False) -> Matrix:
     """The matrix of a file; a file without [matrix] gives a matrix of one flight. Raises `SettingsError`.
 
     A key that `--set` gives is no axis of the file: it has that value in every flight. Several values, as in
     `--set law.k2=[1,2,3]`, are an axis themselves.
+
+    A `draft` holds its mistakes, for `survey`, which tells them together with those of the flights.
     """
-    experiment = file.experiment()
-    mistakes: list[str] = []
+    experiment, mistakes = file.draft()
+    mistaken: dict[str, int] = {}
     fixed = [key[1:] for key in file.overrides]
-    file, given, more = _given(file, mistakes)
-    first = _block(file, ("matrix",), experiment.matrix, more, lists=True, fixed=fixed, mistakes=mistakes)
-    blocks = [first]
-    for i, table in enumerate(experiment.include):
-        blocks.append(_block(file, ("include", i), table, more, lists=False, fixed=fixed, mistakes=mistakes))
+    file, given, more = _given(file, mistakes, mistaken)
+    blocks = [
+        _block(file, at, table, more, lists=lists, fixed=fixed, mistakes=mistakes, mistaken=mistaken)
+        for at, table, lists in (
+            (("matrix",), experiment.matrix, True),
+            *((("include", i), table, False) for i, table in enumerate(experiment.include)),
+        )
+    ]
     excluded = [
         checked
         for i, table in enumerate(experiment.exclude)
-        if (checked := _exclusion(file, ("exclude", i), table, first, fixed, mistakes))
+        if (checked := _exclusion(file, ("exclude", i), table, blocks[0], fixed, mistakes, mistaken))
     ]
-    if mistakes:
+    if mistakes and not draft:
         raise SettingsError(mistakes)
-    return Matrix(file, experiment, blocks, excluded, given)
+    return Matrix(file, experiment, blocks, excluded, given, mistakes, mistaken)
 
 
-def _given(file: SettingsFile, mistakes: list[str]) -> tuple[SettingsFile, Mapping[str, object], list[Axis]]:
+def _given(
+    file: SettingsFile, mistakes: list[str], mistaken: dict[str, int]
+) -> tuple[SettingsFile, Mapping[str, object], list[Axis]]:
     """The file without the overrides that stand for several values, these values by key, and their axes."""
     document = deepcopy(dict(file.document))
     given: dict[str, object] = {}
@@ -181,6 +199,7 @@ def _given(file: SettingsFile, mistakes: list[str]) -> tuple[SettingsFile, Mappi
             axes.append(axis(name, given[name], lists=True, line=lambda _: 0))
         except ValueError as error:
             mistakes.append(f"--set {shortened(text)}: {error}")
+            mistaken[name] = 0  # the place of an override is the override
     return replace(file, document=document), given, axes
 
 
@@ -193,6 +212,7 @@ def _block(
     lists: bool,
     fixed: Sequence[Key],
     mistakes: list[str],
+    mistaken: dict[str, int],
 ) -> Block:
     axes = [*given]
     seen: set[str] = set()
@@ -202,6 +222,8 @@ def _block(
             made = axis(name, value, lists=lists, line=partial(_line, file, where))
         except ValueError as error:
             mistakes.append(f"{file.path}:{_line(file, where)}: {'.'.join(map(str, at))}.{name}: {error}")
+            keys = [key for key in name.split(", ") if all(key.split("."))]
+            mistaken |= dict.fromkeys(keys, _line(file, where))
             continue
         if twice := seen.intersection(made.keys):
             mistakes.append(
@@ -221,14 +243,15 @@ def _exclusion(
     block: Block,
     fixed: Sequence[Key],
     mistakes: list[str],
+    mistaken: Collection[str],
 ) -> Mapping[str, object]:
-    """The values of an exclusion by key; empty if it has a mistake or `--set` gives one of its keys."""
+    """The values of an exclusion by key; empty if a key has a mistake or is given by `--set`."""
     choices = {key: values for a in block.axes for key, values in a.choices().items()}
     checked = {}
     for key, name, value in flattened(table):
         place = f"{file.path}:{_line(file, (*at, *key))}: exclude.{name}"
         if name not in choices:
-            if _is_fixed(name, fixed):
+            if name in mistaken or _is_fixed(name, fixed):
                 return {}
             known = ", ".join(sorted(choices)) or "none"
             mistakes.append(f"{place}: is not an axis of [matrix] with listed values, must be one of: {known}")

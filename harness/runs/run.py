@@ -49,9 +49,11 @@ class Progress:
 def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
     """Flies the flights that are not done yet, and yields the progress at least a few times a second.
 
-    The flights of `matrix` have been checked. Finished flights are kept, however the run ends. Raises `StoreError` and
-    `WorkersError`.
+    The flights of `matrix` have been checked. Finished flights are kept, however the run ends. Raises `StoreError`,
+    `WorkersError`, and `SettingsError` for a draft with mistakes.
     """
+    if matrix.mistakes:
+        raise SettingsError(matrix.mistakes)
     with Store(folder) as store:
         experiment = matrix.experiment
         store.begin(provenance(matrix.file.path, matrix.file.text, experiment.title, experiment.question))

@@ -3,17 +3,15 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from harness.checks import try_start
 from harness.feasibility import warnings
 from harness.flight import Flight
-from harness.plants.plant import PlantError
 from harness.runs.matrix import Combination, Matrix
 from harness.runs.wall_time import typical_wall_time
 from harness.settings import SettingsError
 
 _ROW_BYTES = 4500  # in the journal and in flights.parquet
 _RECORDED_BYTES = 450  # per guidance period, in a recording
-_MOST_MISTAKES = 20
+_MOST_MISTAKES = 50
 _MOST_STARTS = 200  # tried before the run; beyond it, a flight that cannot start becomes a row of the run
 
 
@@ -43,12 +41,13 @@ def disk(total: Survey, recorded: int) -> float:
 
 
 def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = frozenset()) -> Iterator[Survey]:
-    """Checks all flights of the matrix except those at the positions `done`.
+    """Checks all flights of the matrix, which may be a draft, except those at the positions `done`.
 
     Yields the survey so far every 500 flights, and the complete survey at the end. Raises `SettingsError` at the end
     with all mistakes, or after the first `_MOST_MISTAKES`.
     """
-    total = Survey(varies={key: count for key, count in matrix.varies.items() if count > 1})
+    varies = {key: count for key, count in matrix.varies.items() if count > 1}
+    total = Survey(mistakes=[*matrix.mistakes], varies=varies)
     seen, starts = _Seen(), set[object]()
     for position in range(matrix.positions):
         if limit is not None and total.flights >= limit:
@@ -64,7 +63,7 @@ def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = froz
             flight = seen.get(matrix, combination)
             if flight.start not in starts and len(starts) < _MOST_STARTS:
                 starts.add(flight.start)
-                _try_start(matrix, combination)
+                matrix.located(combination).flight(started=True)
         except SettingsError as error:
             total.mistakes += [line for line in error.lines if line not in total.mistakes]
             if len(total.mistakes) >= _MOST_MISTAKES:
@@ -79,7 +78,7 @@ def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = froz
             yield total
     if total.mistakes:
         more = ["... and perhaps more"] if len(total.mistakes) >= _MOST_MISTAKES else []
-        raise SettingsError([*total.mistakes[:_MOST_MISTAKES], *more])
+        raise SettingsError([*sorted(total.mistakes[:_MOST_MISTAKES], key=matrix.file.order), *more])
     yield total
 
 
@@ -98,30 +97,30 @@ class _Seen:
     """Surveys by settings without the seed: flights that differ in the seed alone are surveyed once."""
 
     def __init__(self) -> None:
-        self._known: dict[str, _FlightSurvey] = {}
+        self._known: dict[str, _FlightSurvey | None] = {}  # None for a flight that has a mistake
         self._seeds: set[object] = set()
+        self._wrong = 0  # flights that have a mistake
 
     def get(self, matrix: Matrix, combination: Combination) -> _FlightSurvey:
+        """The survey of a flight. Raises `SettingsError` with its mistakes, of flights that are surveyed once."""
         seed = repr(combination.values.get("seed"))
-        if matrix.draws or "seed" not in combination.values:
-            return _flight_survey(matrix.flight(combination))
-        others = repr([(key, value) for key, value in combination.values.items() if key != "seed"])
-        if others not in self._known or seed not in self._seeds:
-            self._known[others] = _flight_survey(matrix.flight(combination))
+        others = repr([(k, v) for k, v in combination.values.items() if k != "seed" and k not in combination.drawn])
+        is_alone = bool(combination.drawn) or "seed" not in combination.values
+        if others not in self._known or seed not in self._seeds or (is_alone and self._known[others]):
             self._seeds.add(seed)
-        return self._known[others]
+            try:
+                self._known[others] = _flight_survey(matrix.flight(combination, started=self._wrong < _MOST_STARTS))
+            except SettingsError:
+                self._known[others] = None
+                self._wrong += 1
+                raise
+        known = self._known[others]
+        if known is None:
+            raise SettingsError([])
+        return known
 
 
 def _flight_survey(flight: Flight) -> _FlightSurvey:
     random = flight.estimator.filters or flight.wind.turbulence != "none"
     start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
     return _FlightSurvey(tuple(warnings(flight)), random, typical_wall_time(flight), flight.periods, start)
-
-
-def _try_start(matrix: Matrix, combination: Combination) -> None:
-    """Raises `SettingsError` when the flight cannot start."""
-    flight = matrix.flight(combination)
-    try:
-        try_start(flight)
-    except PlantError as error:
-        raise SettingsError([f"{matrix.located(combination).locate(error.key)}: {error}"]) from None

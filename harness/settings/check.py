@@ -1,10 +1,10 @@
 """Checks a table of a settings file with pydantic, and builds the value that it describes."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from types import GenericAlias
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import (
     AfterValidator,
@@ -18,16 +18,31 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from harness.settings.mistake import LARGEST, Places, mistake, settings_error
+from harness.settings.mistake import LARGEST, Mistake, Places, mistake, settings_error
 from harness.settings.table import Setting, TableSchema
 
 
-def checked(table: TableSchema, document: Mapping[str, object], place: Places) -> object:
-    """The value that the document describes, in SI. Raises `SettingsError` with every mistake; `place` locates keys."""
+class Checked(NamedTuple):
+    """What a document describes, in SI, or what is wrong with it."""
+
+    value: object  # None if there are mistakes
+    mistakes: Sequence[Mistake]
+
+
+def check(table: TableSchema, document: Mapping[str, object]) -> Checked:
+    """The value that the document describes, or every mistake in it."""
     try:
-        return _made(table, _model(table).model_validate(document))
+        return Checked(_made(table, _model(table).model_validate(document)), [])
     except ValidationError as error:
-        raise settings_error([mistake(table, document, details) for details in error.errors()], place) from None
+        return Checked(None, [mistake(table, document, details) for details in error.errors()])
+
+
+def checked(table: TableSchema, document: Mapping[str, object], place: Places) -> object:
+    """The value that the document describes. Raises `SettingsError` with every mistake; `place` locates keys."""
+    value, mistakes = check(table, document)
+    if mistakes:
+        raise settings_error(mistakes, place)
+    return value
 
 
 @cache

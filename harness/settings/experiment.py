@@ -48,10 +48,14 @@ def flight_table(law: TableSchema) -> TableSchema:
 
 
 def law_table(name: str | None, gains_given: bool) -> TableSchema:
-    """The schema of [flight.law]. Without a `name` it asks for the name only; with `gains_given`, for every gain."""
+    """The schema of [flight.law]; with `gains_given` it asks for every gain. Without a `name`: that of all laws."""
     named = {"name": Setting(Literal[*LAWS], "name")}
     if name is None:
-        return TableSchema(named, dict, open=True)
+        keys = {
+            key: replace(s, required=False) for law in LAWS.values() for key, s in schema_of(law.value).settings.items()
+        }
+        every = dict.fromkeys(gains for law in LAWS.values() for gains in (*law.gain_sets, CUSTOM))
+        return TableSchema({**keys, **named, "gains": Setting(Literal[*every], "gains", required=False)}, dict)
     kind = LAWS[name]
     value, sets = kind.value, {**kind.gain_sets, CUSTOM: {}}
 

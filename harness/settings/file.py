@@ -11,15 +11,16 @@ from pathlib import Path
 
 import aircraft
 from autopilot.laws import LAWS
-from harness.checks import problems
+from harness.checks import problems, start_problems
 from harness.error import SettingsError
 from harness.files import file_name
 from harness.flight import Flight
 from harness.margins import Assess
-from harness.settings.check import checked
+from harness.settings.check import Checked, check, checked
 from harness.settings.experiment import CUSTOM, Experiment, document_table
 from harness.settings.former_names import without_former_names
 from harness.settings.keys import file_key, put
+from harness.settings.mended import concerns, mended
 from harness.settings.mistake import Mistake, Place, Places, settings_error
 from harness.settings.speed import at_own_speed
 from harness.settings.table import TableSchema, schema_of
@@ -37,20 +38,30 @@ class SettingsFile:
     lines: Mapping[Key, int]  # the line of each key, from 1
     overrides: Mapping[Key, str]  # by key, the text KEY=VALUE that sets it
 
-    def flight(self) -> Flight:
-        """The file's one flight. Raises `SettingsError`."""
+    def flight(self, *, started: bool = False) -> Flight:
+        """The file's one flight; with `started` it is tried whether it can start. Raises `SettingsError`."""
         matrix = self.document.get("matrix")
         if matrix and isinstance(matrix, dict):
             raise SettingsError(
                 [f"{self._place(('matrix',)).text}: matrix: is many flights, must be one: use `harness run`"]
             )
-        return _flight(self.document, self._place, self.path.parent)
+        return _flight(self.document, self._place, self.path.parent, started=started)
 
     def experiment(self) -> Experiment:
         """Everything in the file; the content of [flight] and of [matrix] stays unchecked. Raises `SettingsError`."""
-        experiment = checked(schema_of(Experiment), self.document, self._place)
-        assert isinstance(experiment, Experiment)
+        experiment, mistakes = self.draft()
+        if mistakes:
+            raise SettingsError(mistakes)
         return experiment
+
+    def draft(self) -> tuple[Experiment, list[str]]:
+        """The same apart from what is wrong in it, and the mistakes."""
+        experiment, mistakes = check(schema_of(Experiment), self.document)
+        if mistakes:
+            rest = mended(self.document, [mistake.key for mistake in mistakes])
+            experiment, _ = check(schema_of(Experiment), rest)
+        assert isinstance(experiment, Experiment)
+        return experiment, settings_error(mistakes, self._place).lines
 
     def assess(self) -> Assess:
         """The margins of the verdict, from the table [assess] alone. Raises `SettingsError`."""
@@ -65,6 +76,11 @@ class SettingsFile:
         """Place and key of a field by its dotted name: `FILE:LINE: flight.start.airspeed_mps` for `start.airspeed`."""
         key = file_key(name)
         return f"{self._place(key).text}: {dotted(key)}"
+
+    def order(self, message: str) -> int:
+        """By which the messages about this file are sorted: the line, from 0; those of `--set` come last."""
+        line = message.removeprefix(f"{self.path}:").partition(":")[0]
+        return int(line) if line.isdecimal() else sys.maxsize
 
     def warn(self, key: Key, message: str) -> None:
         """A FutureWarning that says where the key stands."""
@@ -150,8 +166,29 @@ def _text(path: Path) -> str:
         raise SettingsError([f"{path}:{line}: not text in UTF-8"]) from None
 
 
-def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flight:
-    """The flight of a document, completely checked; relative paths of a track or an airframe start at `folder`."""
+def _flight(document: Mapping[str, object], place: Places, folder: Path, *, started: bool = False) -> Flight:
+    """The flight of a document, completely checked; relative paths of a track or an airframe start at `folder`.
+
+    With `started` it is tried whether it can start. Raises `SettingsError`.
+    """
+    value, found = _described(document, folder)
+    wrong = [mistake.key for mistake in found]
+    if wrong:
+        value, _ = _described(mended(document, wrong), folder)
+    if not isinstance(value, Flight):
+        raise settings_error(found, place)
+    mistakes = [*found]
+    for problem in [*problems(value), *(start_problems(value) if started else ())]:
+        keys = [file_key(name) for name in (problem.name, *problem.others)]
+        if not any(concerns(key, wrong) for key in keys):
+            mistakes.append(Mistake(keys[0], problem.message))
+    if mistakes:
+        raise settings_error(mistakes, place)
+    return value
+
+
+def _described(document: Mapping[str, object], folder: Path) -> Checked:
+    """The flight of a document, each of its values checked on its own; the paths of track and airframe are absolute."""
     match document:
         case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS:
             table = document_table(name, law.get("gains") == CUSTOM)
@@ -161,15 +198,11 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path) -> Flig
     schema = table.settings["flight"].table
     if isinstance(given, Mapping) and schema is not None:
         document = {**document, "flight": at_own_speed(_with_airframe(given, folder), schema)}
-    flight = checked(table, document, place)
-    assert isinstance(flight, Flight)
-    if flight.target.track is not None:
+    flight, mistakes = check(table, document)
+    if isinstance(flight, Flight) and flight.target.track is not None:
         track = str(folder.absolute() / file_name(flight.target.track))
         flight = replace(flight, target=replace(flight.target, track=track))
-    mistakes = [Mistake(file_key(problem.name), problem.message) for problem in problems(flight)]
-    if mistakes:
-        raise settings_error(mistakes, place)
-    return flight
+    return Checked(flight, mistakes)
 
 
 def _with_airframe(flight: Mapping[str, object], folder: Path) -> Mapping[str, object]:

@@ -8,6 +8,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic_core import ErrorDetails
 
 from harness.error import SettingsError, did_you_mean
+from harness.settings.mended import TOLD
 from harness.settings.table import Setting, TableSchema
 from harness.settings.toml_locator import Key, dotted
 from harness.toml_text import shown
@@ -33,12 +34,13 @@ class Mistake(NamedTuple):
     """What is wrong at a key."""
 
     key: Key
-    message: str
+    message: str  # empty if it was told already
 
 
 def settings_error(mistakes: Sequence[Mistake], place: Places) -> SettingsError:
     """The mistakes as one error, in the order of their places."""
-    placed = sorted(((place(key), f"{dotted(key)}: {message}") for key, message in mistakes), key=lambda p: p[0].order)
+    told = ((place(key), f"{dotted(key)}: {message}") for key, message in mistakes if message)
+    placed = sorted(told, key=lambda p: p[0].order)
     return SettingsError(list(dict.fromkeys(": ".join(filter(None, (at.text, text))) for at, text in placed)))
 
 
@@ -63,6 +65,8 @@ def mistake(table: TableSchema, document: Any, details: ErrorDetails) -> Mistake
             return Mistake(key, f"is missing, must be {_expected(setting)}")
         value = value[step]
     assert setting
+    if value is TOLD:
+        return Mistake(key, "")
     expected = _expected(replace(setting, length=None) if isinstance(key[-1], int) else setting)
     if details["type"] == "finite_number":
         expected = expected.replace("number", "finite number")
