@@ -16,7 +16,7 @@ from harness.review.notes import flight_json, result_notes, settings_notes
 from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
-from harness.review.seal import PLACEHOLDER, sealed
+from harness.review.seal import TEXT, sealed
 from harness.review.styled import StyledFlight, styled
 from harness.review.target_plots import target_plots
 
@@ -127,7 +127,7 @@ def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     to = Recorder()
     memory = to.stream.memory_recording()
     to.stream.set_log_time_enabled(False)
-    to.once("/notes/checksum", rr.TextDocument(PLACEHOLDER))
+    to.once("/notes/checksum", rr.TextDocument(TEXT))
     to.layout(layout(content))
     to.stream.send_recording_name(as_text(title))
     log_surroundings(to, flights[0].log)
