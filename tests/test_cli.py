@@ -224,7 +224,10 @@ def test_a_commands_help_imports_that_command_alone() -> None:
     ("words", "told"),
     [
         ("fyl", "harness: No such command 'fyl'. Did you mean 'fly'?; try"),
-        ("list planes", "harness list: Invalid value for '{laws|aircraft|plants|metrics|margins}': 'planes' is not"),
+        (
+            "list planes",
+            "harness list: Invalid value for '{laws|aircraft|plants|metrics|margins|settings}': 'planes' is not",
+        ),
         ("run", "harness run: Missing argument 'FILE'; try"),
         ("run x.toml --wokers 2", "harness run: No such option '--wokers'"),
         ("run x.toml --out", "harness run: Option '--out' requires an argument; try 'harness run --help'"),
@@ -265,8 +268,21 @@ def test_the_doctor_finds_this_installation_sound() -> None:
     assert "BAD" not in done.stdout
 
 
-@pytest.mark.parametrize("kind", ["laws", "aircraft", "plants", "metrics", "margins"])
+@pytest.mark.parametrize("kind", ["laws", "aircraft", "plants", "metrics", "margins", "settings"])
 def test_every_kind_is_listed(kind: str) -> None:
     done = command("list", kind)
     assert done.returncode == 0
     assert len(done.stdout.splitlines()) >= 2
+
+
+def test_the_settings_are_listed_with_every_key_that_set_takes_each_with_default_and_meaning(file: Path) -> None:
+    lines = invoke("list", "settings").stdout.splitlines()
+    told = {line.split()[0]: line for line in lines if line and "  " in line}
+    settings = json.loads(invoke("fly", file, "--json").stdout)["flight"]
+    for key, value in settings.items():
+        for name in [f"{key}.{inner}" for inner in value] if isinstance(value, dict) else [key]:
+            assert name in told
+    for name in ("law.c1", "target.segments.turn_rate_deg_s", "wind.gusts.to_s", "assess.sideslip_deg"):
+        assert name in told
+    assert re.fullmatch(r"start\.heading_deg +° +30\.0 +direction of the air velocity, .*", told["start.heading_deg"])
+    assert told["wind.turbulence"].endswith(": none, light, moderate, severe")

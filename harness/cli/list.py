@@ -53,20 +53,27 @@ def _metrics() -> Iterator[str]:
 
 
 def _margins() -> Iterator[str]:
-    from typing import get_args, get_type_hints
-
-    from autopilot.quantities import About
     from harness.margins import Assess
-    from harness.settings.table import schema_of
-    from harness.settings.written import written
-    from harness.tables import number, table
+    from harness.settings.catalogue import TABLES, keys_of
+    from harness.tables import table
 
-    hints = get_type_hints(Assess, include_extras=True)
-    rows = []
-    for key, value in written(Assess()).items():
-        hint = hints[schema_of(Assess).settings[key].name]
-        rows.append([f"assess.{key}", number(value), next(m.text for m in get_args(hint) if isinstance(m, About))])
-    yield from table(["margin", "default", "what it bounds, and where its default comes from"], rows, "lrl")
+    (margins,) = (part for part in TABLES if part.kind is Assess)
+    rows = ([margins.prefix + one.key, one.unit, one.default, one.meaning] for one in keys_of(margins))
+    yield from table(["margin", "unit", "default", "what it bounds, and where its default comes from"], rows, "llrl")
+
+
+def _settings() -> Iterator[str]:
+    from harness.settings.catalogue import TABLES, keys_of
+    from harness.tables import table
+
+    for i, part in enumerate(TABLES):
+        yield from [""] * bool(i)
+        yield part.name
+        rows = []
+        for one in keys_of(part):
+            choices = f": {', '.join(one.choices)}" if one.choices else ""
+            rows.append([part.prefix + one.key, one.unit, one.default, one.meaning + choices])
+        yield from table(["key", "unit", "default", "meaning"], rows)
 
 
 _KINDS: Mapping[str, Callable[[], Iterator[str]]] = {
@@ -75,21 +82,23 @@ _KINDS: Mapping[str, Callable[[], Iterator[str]]] = {
     "plants": _plants,
     "metrics": _metrics,
     "margins": _margins,
+    "settings": _settings,
 }
 
 
 @click.command("list")
 @click.argument("kind", type=click.Choice(list(_KINDS)))
 def list_(kind: str) -> None:
-    """List the laws, aircraft, plants, metrics or margins.
+    """List the laws, aircraft, plants, metrics, margins or settings.
 
     Prints a table: the laws with their gain sets, the aircraft with their limits, the plants from the kinematic one
-    up, the metrics with their units and meaning, or the margins of the verdict with their defaults.
+    up, the metrics with their units and meaning, the margins of the verdict with their defaults, or every key of a
+    settings file with its unit, default and meaning: `--set` takes these keys.
 
     \b
     Examples:
       harness list laws
-      harness list margins
+      harness list settings
     """
     for line in _KINDS[kind]():
         click.echo(line)

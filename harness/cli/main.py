@@ -42,7 +42,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "reproduce": Entry("reproduce:reproduce", "Fly the paper's simulations and check its claims."),
         },
         "Airframes and installation": {
-            "list": Entry("list:list_", "List the laws, aircraft, plants, metrics or margins."),
+            "list": Entry("list:list_", "List the laws, aircraft, plants, metrics, margins or settings."),
             "identify": Entry("identify:identify", "Identify how an airframe follows a heading-rate command."),
             "doctor": Entry("doctor:doctor", "Check this installation: versions, wind and units."),
         },

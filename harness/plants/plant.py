@@ -77,7 +77,11 @@ class Start:
 
     position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (-200.0, 200.0)
     heading: Annotated[Degrees, About("direction of the air velocity, clockwise from north")] = math.radians(30.0)
-    airspeed: Annotated[MetresPerSecond, Ge(0.1), About("nominal airspeed, held throughout")] = 13.0
+    airspeed: Annotated[
+        MetresPerSecond,
+        Ge(0.1),
+        About("nominal airspeed, held throughout; a file that leaves it out has the airframe's own"),
+    ] = 13.0
     altitude: Annotated[Metres, About("above the ground, held throughout")] = 150.0
 
 

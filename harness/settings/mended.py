@@ -8,13 +8,13 @@ from typing import Any
 from harness.settings.toml_locator import Key
 
 
-class Told(Enum):
+class ToldBefore(Enum):
     """Stands for a value that is wrong, which was told already."""
 
     TOLD = "told"
 
 
-TOLD = Told.TOLD
+TOLD = ToldBefore.TOLD
 
 # What stands for a mistaken setting that has no default, and changes nothing
 _PLANT, _LAW = "kinematic", {"name": "nftsm"}
