@@ -286,3 +286,23 @@ def test_the_settings_are_listed_with_every_key_that_set_takes_each_with_default
         assert name in told
     assert re.fullmatch(r"start\.heading_deg +° +30\.0 +direction of the air velocity, .*", told["start.heading_deg"])
     assert told["wind.turbulence"].endswith(": none, light, moderate, severe")
+
+
+def test_the_experiment_to_start_from_checks_and_runs_as_it_is_and_with_all_that_its_comments_offer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = invoke("init", 'a "new" question').stdout.splitlines()
+    file = Path('a "new" question.toml')
+    assert told == [str(file), f"next: harness check '{file}', harness run '{file}' --out 'out/{file.stem}'"]
+    checked = invoke("check", file)
+    assert (checked.exit_code, checked.stderr) == (0, "")
+    assert checked.stdout.startswith(f"{file.stem}\n")
+    assert "56 flights" in checked.stdout
+    run = invoke("run", file, "--out", "out", "--limit", "2", "--workers", "0", "--log", "none")
+    assert "2 flown, 0 earlier, 0 failed" in run.stdout
+    everything = re.sub(r"^# (?=\S+ = |\[)", "", file.read_text(), flags=re.MULTILINE)
+    assert invoke("check", write(tmp_path / "all.toml", everything)).exit_code == 0
+    assert "exclude" in everything
+    again = invoke("init", file)
+    assert (again.exit_code, again.stderr) == (2, f"{file}: exists already; choose another name\n")

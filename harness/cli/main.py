@@ -32,6 +32,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "export": Entry("export:export", "Write the log of a flight, or the flights of a run, as a table."),
         },
         "Many flights": {
+            "init": Entry("init:init", "Write a commented experiment to start from."),
             "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
             "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
