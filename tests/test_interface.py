@@ -259,7 +259,8 @@ def test_the_metrics_of_a_log_are_those_of_the_function(log: harness.FlightLog) 
 def test_the_picture_shows_the_track_with_equal_scales_the_circle_and_units(log: harness.FlightLog) -> None:
     figure = log.plot()
     assert isinstance(figure, Figure)
-    ground, *over_time = figure.axes
+    ground, spectrum, *over_time = figure.axes
+    assert spectrum.get_xlabel() == "Hz"
     assert ground.get_aspect() == 1.0
     assert (ground.get_xlabel(), ground.get_ylabel()) == ("east, m", "north, m")
     labels = ground.get_legend_handles_labels()[1]
@@ -269,7 +270,7 @@ def test_the_picture_shows_the_track_with_equal_scales_the_circle_and_units(log:
     distance = np.hypot(*(np.asarray(circle.get_xydata()) - (10.0, 10.0)).T)
     np.testing.assert_allclose(distance, 200.0)
     assert [axes.get_title("left").partition(" (")[0] for axes in over_time] == [
-        "range error, m", "heading rate, deg/s", "bank, deg",
+        "|range error|, m", "heading rate, deg/s", "bank, deg", "sideslip, deg",
     ]  # fmt: skip
     assert over_time[-1].get_xlabel() == "time, s"
 

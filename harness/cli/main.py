@@ -29,6 +29,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "check": Entry("check:check", "Check a settings file without flying it."),
             "predict": Entry("predict:predict", "Predict the limit cycle of a flight without flying it."),
             "view": Entry("view:view", "Open flights in the Rerun viewer."),
+            "plot": Entry("plot:plot", "Draw flights, or a map of a run, as a figure in print size."),
             "export": Entry("export:export", "Write the log of a flight, or the flights of a run, as a table."),
         },
         "Many flights": {

@@ -70,6 +70,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
 
 def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, FlightLog] | None:
     """The flights asked for, by name; None: all of a recording, as it is."""
+    from harness.cli._flights import say
     from harness.cli._input import BadInput
     from harness.review.styled import MOST
     from harness.runs.logs import distinctly_named, pair_of_row
@@ -93,38 +94,33 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
         raise BadInput(f"{what}: no such file or folder")
     elif not flights and pair is None:
         raise BadInput(f"{what}: choose flights with --flight KEY or --pair KEY; `harness show {what}` lists the keys")
-    try:
-        if pair is not None:
-            return distinctly_named(pair_of_row(path, pair, _say))
+    if pair is None:
         return distinctly_named(_rows(path, flights))
+    try:
+        return distinctly_named(pair_of_row(path, pair, say))
     except (StoreError, SettingsError, ValueError) as error:
         raise BadInput(str(error)) from None
 
 
 def _rows(folder: Path, keys: tuple[str, ...]) -> list[FlightLog]:
+    from harness.cli._flights import row
     from harness.cli._progress import progress
-    from harness.runs.logs import flight_of_row
 
     logs = []
     with progress("reading flights", len(keys)) as advance:
         for key in keys:
-            logs.append(flight_of_row(folder, key, _say))
+            logs.append(row(folder, key))
             advance()
     return logs
 
 
 def _of_file(path: Path, names: tuple[str, ...]) -> dict[str, FlightLog] | None:
+    from harness.cli._flights import recorded
     from harness.cli._input import BadInput
-    from harness.review.reading import read_logs
-    from harness.review.seal import check
 
-    try:
-        if not names:
-            check(path)
-            return None
-        held = read_logs(path)
-    except (OSError, ValueError) as error:
-        raise BadInput(str(error)) from None
+    if not names:
+        return None
+    held = recorded(path)
     for name in names:
         if name not in held:
             raise BadInput(f"{path}: holds no flight {name!r}; it holds {', '.join(held)}")
@@ -139,7 +135,3 @@ def _open(path: Path | None, port: int) -> None:
         show(path, port)
     except ViewerError as error:
         raise BadInput(str(error)) from None
-
-
-def _say(line: str) -> None:
-    click.echo(line, err=True)

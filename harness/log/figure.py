@@ -1,120 +1,262 @@
-"""The picture of a flight: its track on the map, and its errors over time."""
+"""Figures of flights: a function for each panel, and `paint`, which lays panels out on a figure.
 
-import io
-from collections.abc import Sequence
+`FlightLog.plot`, `harness plot` and the report draw the same panels.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from harness.drawing import COLOURS, COLUMN, FAINT, INK, PAGE, Picture
+from harness.drawing import picture as drawn
+from harness.error import did_you_mean
 from harness.log.flight_log import FlightLog
+from harness.log.metric import Signals
+from harness.plants.plant import Outcome
 
-COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown")
+Array = NDArray[np.float64]
+Flights = Mapping[str, FlightLog]  # by the names that the legend gives them
+
+MOST = len(COLOURS)  # flights in one figure
+_WIDE, _THIN = 2.0, 0.9  # points: the first flight lies under the others, so it is wider
+_LETTERS, _BESIDE_LETTERS = 18.0, 5  # of a legend: per inch, and as wide as so many is the rest of an entry
+_MOST_BY_ALL = 2  # flights that have all panels unless some are chosen: more would hide each other
+_SHORTEST = 32  # rows: what is shorter has no spectrum
+_BINS = 30  # of the spectrum, per decade
+_LEAST_ERROR = 1e-6  # m: what is smaller is rounding
 
 
-class Picture(Figure):
-    """A figure that a notebook shows by itself, without pyplot and its global state."""
+def picture(flights: Flights, panels: Sequence[str] = ()) -> Picture:
+    """These panels of the flights as a figure in print size; without a choice all, of many flights the clearest.
 
-    def _repr_png_(self) -> bytes:
-        out = io.BytesIO()
-        self.savefig(out, format="png")
-        return out.getvalue()
-
-
-def picture(logs: Sequence[FlightLog]) -> Figure:
-    """Tracks of flights around their targets, range error, heading rate, bank and sideslip over time.
-
-    ValueError for more flights than there are colours, and for a flight without a row.
+    ValueError for more flights than there are colours, a flight without a row, or panels that no flight here has.
     """
-    if len(logs) > len(COLOURS):
-        raise ValueError(f"{len(logs)} flights: up to {len(COLOURS)} can be told apart")
-    if without := [log for log in logs if not len(log)]:
-        raise ValueError(f"nothing to draw: {without[0].reason}")
-    names = _names(logs)
-    banked = any(np.isfinite(log["bank"]).any() for log in logs)
-    figure = Picture(figsize=(10.0, 5.4), dpi=80, layout="constrained")
-    grid = figure.add_gridspec(3 if banked else 2, 2, width_ratios=(1.0, 1.1))
-    ground = figure.add_subplot(grid[:, 0])
-    rows = [figure.add_subplot(grid[0, 1])]
-    rows += [figure.add_subplot(grid[row, 1], sharex=rows[0]) for row in range(1, grid.nrows)]
-    draw_track(ground, logs, names)
-    draw_range_error(rows[0], logs)
-    draw_heading_rate(rows[1], logs)
-    if banked:
-        draw_bank(rows[2], logs)
-    for axes in rows[:-1]:
-        axes.tick_params(labelbottom=False)
-    rows[-1].set_xlabel("time, s")
-    for axes in (ground, *rows):
-        axes.grid(alpha=0.3)
-    figure.suptitle("   ".join(f"{name}: {ended(log)}" for name, log in zip(names, logs, strict=True)), fontsize=10)
-    return figure
+    kept = panels_of(flights, panels)
+    columns = _columns(kept)
+    width = PAGE if all(columns) else COLUMN
+    rows = max(sum(2.0 if name == "track" else 1.0 for name in column) for column in columns)
+    height = max(2.4, 1.35 * rows + 0.5)
+    return drawn(partial(paint, flights=flights, panels=kept), width, height)
 
 
-def ended(log: FlightLog) -> str:
-    """How the flight ended, in a few words."""
-    return log.outcome.value + (f" at {log['time'][-1]:.1f} s: {log.reason}" if log.reason and len(log) else "")
+def panels_of(flights: Flights, panels: Sequence[str] = ()) -> list[str]:
+    """The panels that can be drawn of those asked for. Errors as `picture`."""
+    if not 1 <= len(flights) <= MOST:
+        raise ValueError(f"{len(flights)} flights: up to {MOST} can be told apart")
+    for name, log in flights.items():
+        if not len(log):
+            raise ValueError(f"{name}: nothing to draw: {log.reason}")
+    for name in panels:
+        if name not in PANELS:
+            raise ValueError(f"no panel {name!r}{did_you_mean(name, PANELS)}; the panels are {', '.join(PANELS)}")
+    usual = list(PANELS) if len(flights) <= _MOST_BY_ALL else ["track", "error", "spectrum"]
+    kept = [name for name in panels or usual if any(PANELS[name].has(log) for log in flights.values())]
+    if not kept:
+        plants = ", ".join(dict.fromkeys(log.flight.plant for log in flights.values()))
+        raise ValueError(f"no flight here has {' or '.join(panels)} (plant {plants})")
+    return kept
 
 
-def draw_track(axes: Axes, logs: Sequence[FlightLog], names: Sequence[str]) -> None:
-    """North up, east to the right, equal scales; the standoff circle is around the target where it ends."""
-    for log, name, colour in zip(logs, names, COLOURS, strict=False):
-        axes.plot(log["east"], log["north"], color=colour, lw=1.2, label=name)
-        axes.plot(log["east"][:1], log["north"][:1], "o", color=colour, ms=5)
-    axes.plot([], [], "o", color="tab:gray", ms=5, label="start")
-    around = np.linspace(0.0, 2.0 * np.pi, 361)
-    circled = {
-        (log.flight.target, log.flight.law.standoff): log for log in sorted(logs, key=len)
-    }  # the longest of each
-    for (_, standoff), log in circled.items():
-        east, north = log["target_east"], log["target_north"]
-        if np.ptp(east) or np.ptp(north):
-            axes.plot(east, north, color="black", lw=0.8, ls=":", label="target's track")
-        axes.plot(east[-1:], north[-1:], "x", color="black", ms=7, label="target")
-        circle = east[-1] + standoff * np.sin(around), north[-1] + standoff * np.cos(around)
-        axes.plot(*circle, color="black", lw=0.8, ls="--", label=f"standoff circle, {standoff:g} m")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("east, m")
-    axes.set_ylabel("north, m")
-    handles = {handle.get_label(): handle for handle in axes.get_legend_handles_labels()[0]}  # each label once
-    axes.legend(
-        handles=handles.values(), fontsize=8, ncols=3, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.12)
+def paint(figure: Figure, flights: Flights, panels: Sequence[str] = ()) -> None:
+    """Lays out the panels, those over time on the right, with one legend below them. Errors as `picture`."""
+    kept = panels_of(flights, panels)
+    left, right = _columns(kept)
+    columns = [column for column in (left, right) if column]
+    grid = figure.add_gridspec(1, len(columns), width_ratios=(1.0, 1.3)[: len(columns)])
+    legend: dict[str, Artist] = {}
+    for place, column in enumerate(columns):
+        tall = [2.0 if name == "track" else 1.0 for name in column]
+        rows = grid[0, place].subgridspec(len(column), 1, height_ratios=tall)
+        shared: Axes | None = None
+        for row, name in enumerate(column):
+            axes = figure.add_subplot(rows[row, 0], sharex=shared)
+            PANELS[name].draw(axes, flights)
+            if column is right:
+                shared = shared or axes
+                axes.tick_params(labelbottom=row == len(column) - 1)
+                axes.set_xlabel("time, s" if row == len(column) - 1 else "")
+            for handle, text in zip(*axes.get_legend_handles_labels(), strict=True):
+                legend.setdefault(text, handle)
+    across = max(1, int(_LETTERS * figure.get_figwidth() / (max(map(len, legend)) + _BESIDE_LETTERS)))
+    figure.legend(
+        legend.values(), legend.keys(), loc="outside lower center", ncols=across, frameon=False, fontsize="small"
     )
 
 
-def draw_range_error(axes: Axes, logs: Sequence[FlightLog]) -> None:
-    """Distance to the target minus the standoff distance; the band is the tolerance of convergence."""
-    for log, colour in zip(logs, COLOURS, strict=False):
-        axes.plot(log["time"], log["range_error"], color=colour, lw=1.2)
-    tolerance = logs[0].flight.metrics.tolerance
-    axes.axhspan(-tolerance, tolerance, color="tab:green", alpha=0.25, lw=0)
-    axes.set_yscale("symlog", linthresh=tolerance)
-    _title(axes, f"range error, m (band: the tolerance of convergence, {tolerance:g} m)")
+def track(axes: Axes, flights: Flights) -> None:
+    """Seen from above, north up, with equal scales; each standoff circle is around its target where that ends."""
+    for log, style in _styled(flights):
+        axes.plot(log["east"], log["north"], **style)
+        axes.plot(log["east"][:1], log["north"][:1], "o", color=style["color"], ms=4)
+        if log.outcome is not Outcome.COMPLETED:
+            axes.plot(log["east"][-1:], log["north"][-1:], "X", color=style["color"], ms=6)
+    axes.plot([], [], "o", color=FAINT, ms=4, label="start")
+    around = np.linspace(0.0, 2.0 * np.pi, 361)
+    longest = sorted(flights.values(), key=len)
+    for (_, standoff), log in {(log.flight.target, log.flight.law.standoff): log for log in longest}.items():
+        east, north = log["target_east"], log["target_north"]
+        if np.ptp(east) or np.ptp(north):
+            axes.plot(east, north, color=INK, lw=0.8, ls=":", label="target's track")
+        axes.plot(east[-1:], north[-1:], "+", color=INK, ms=7, label="target")
+        circle = east[-1] + standoff * np.sin(around), north[-1] + standoff * np.cos(around)
+        axes.plot(*circle, color=INK, lw=0.7, ls="--", label=f"standoff circle, {standoff:.6g} m")
+    _wind(axes, longest[-1])
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("east, m")
+    axes.set_ylabel("north, m")
 
 
-def draw_heading_rate(axes: Axes, logs: Sequence[FlightLog]) -> None:
-    """Flown, and thinly the command."""
-    for log, colour in zip(logs, COLOURS, strict=False):
-        axes.plot(log["time"], np.degrees(log["heading_rate_command"]), color=colour, lw=0.6, alpha=0.5)
-        axes.plot(log["time"], np.degrees(log["heading_rate"]), color=colour, lw=1.2)
-    _title(axes, "heading rate, deg/s (thin: its command)")
+def error(axes: Axes, flights: Flights) -> None:
+    """|Distance to the target minus the standoff distance| on a log scale, so that the settled part is seen too.
+
+    Of more than two flights only the peak of each second, so that each can be followed.
+    """
+    lowest, peaks = [], len(flights) > _MOST_BY_ALL
+    for log, style in _styled(flights):
+        time, size = log["time"], np.abs(log["range_error"])
+        if peaks:
+            begins = np.arange(0, len(log), max(1, round(1.0 / log.flight.guidance_period)))
+            time, size = time[begins], np.maximum.reduceat(size, begins)
+        axes.plot(time, np.maximum(size, _LEAST_ERROR), **style)
+        lowest.append(float(np.median(np.abs(Signals(log).circling("range_error")))))
+    tolerances = sorted({log.flight.metrics.tolerance for log in flights.values()})
+    for tolerance in tolerances:
+        axes.axhline(tolerance, color=INK, lw=0.7, ls="--")
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=10.0 ** math.floor(math.log10(max(0.2 * min(lowest), _LEAST_ERROR))))
+    of = ", peak of each second" if peaks else ""
+    _title(axes, f"|range error|, m{of} (dashed: tolerance, {', '.join(f'{t:.3g}' for t in tolerances)} m)")
 
 
-def draw_bank(axes: Axes, logs: Sequence[FlightLog]) -> None:
-    """Bank and sideslip of the plants that have them."""
-    for log, colour in zip(logs, COLOURS, strict=False):
-        axes.plot(log["time"], np.degrees(log["bank"]), color=colour, lw=1.2)
-        axes.plot(log["time"], np.degrees(log["sideslip"]), color=colour, lw=0.8, ls="--")
-    _title(axes, "bank, deg (dashed: sideslip)")
+def rate(axes: Axes, flights: Flights) -> None:
+    """The heading rate flown, and thinly the law's command."""
+    for log, style in _styled(flights):
+        axes.plot(log["time"], np.degrees(log["heading_rate_command"]), **_thin(style))
+        axes.plot(log["time"], np.degrees(log["heading_rate"]), **style)
+    _title(axes, "heading rate, deg/s (thin: the law's command)")
+
+
+def bank(axes: Axes, flights: Flights) -> None:
+    """The bank of the plants that have one, and thinly the bank that the inner loop commands."""
+    for log, style in _styled(flights):
+        axes.plot(log["time"], np.degrees(log["bank_command"]), **_thin(style))
+        axes.plot(log["time"], np.degrees(log["bank"]), **style)
+    _title(axes, "bank, deg (thin: its command)")
+
+
+def sideslip(axes: Axes, flights: Flights) -> None:
+    """The sideslip of the plants that have one."""
+    for log, style in _styled(flights):
+        axes.plot(log["time"], np.degrees(log["sideslip"]), **style)
+    _title(axes, "sideslip, deg")
+
+
+def spectrum(axes: Axes, flights: Flights) -> None:
+    """How strongly the law's command swings at each frequency while circling is judged; a dot marks a limit cycle."""
+    highest = 0.0
+    for log, style in _styled(flights):
+        signals = Signals(log)
+        frequency, amplitude = command_spectrum(signals)
+        axes.plot(frequency, amplitude, **style)
+        highest = max(highest, float(amplitude.max(initial=0.0)))
+        if (cycle := signals.limit_cycle) is not None:
+            at = np.searchsorted(frequency, cycle.frequency, side="right") - 1
+            axes.plot(frequency[at], amplitude[at], "o", color=style["color"], ms=4)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    top = max(2.0 * highest, 1e-3)
+    axes.set_ylim(1e-5 * top, top)
+    axes.set_xlabel("Hz")
+    _title(axes, "command's spectrum, deg/s (dot: limit cycle)")
+
+
+def command_spectrum(signals: Signals) -> tuple[Array, Array]:
+    """Frequency, Hz, and amplitude, deg/s, of the law's command while circling is judged; empty of a short record.
+
+    A sinusoid has its own amplitude at its frequency (Hann's window); of each thirtieth of a decade the highest.
+    """
+    command = signals.circling("heading_rate_command")
+    if len(command) < _SHORTEST:
+        return np.empty(0), np.empty(0)
+    window = np.hanning(len(command))
+    amplitude = 2.0 * np.abs(np.fft.rfft((command - command.mean()) * window)) / window.sum()
+    frequency = np.fft.rfftfreq(len(command), signals.period)[1:]
+    begins = np.unique(np.floor(_BINS * np.log10(frequency / frequency[0]) + 1e-9), return_index=True)[1]
+    highest = np.asarray(np.degrees(np.maximum.reduceat(amplitude[1:], begins)), np.float64)
+    return np.asarray(frequency[begins], np.float64), highest
+
+
+class Panel(NamedTuple):
+    """A panel of a figure."""
+
+    draw: Callable[[Axes, Flights], None]
+    over_time: bool
+    column: str = "time"  # of the log, without which a flight has nothing to show here
+
+    def has(self, log: FlightLog) -> bool:
+        """Whether the flight has anything to show."""
+        return bool(np.isfinite(log[self.column]).any())
+
+
+PANELS: Mapping[str, Panel] = MappingProxyType(
+    {
+        "track": Panel(track, False),
+        "error": Panel(error, True),
+        "rate": Panel(rate, True),
+        "bank": Panel(bank, True, "bank"),
+        "sideslip": Panel(sideslip, True, "sideslip"),
+        "spectrum": Panel(spectrum, False),
+    }
+)
+
+
+def named(logs: Sequence[FlightLog]) -> Flights:
+    """The flights by their plants, numbered where two have the same."""
+    plants = [log.flight.plant for log in logs]
+    if len(set(plants)) == len(plants):
+        return dict(zip(plants, logs, strict=True))
+    return {f"{number} {log.flight.plant}": log for number, log in enumerate(logs, 1)}
+
+
+def _columns(panels: Sequence[str]) -> tuple[list[str], list[str]]:
+    """What stands on the left, and what on the right: over time."""
+    left, right = ([name for name in panels if PANELS[name].over_time is side] for side in (False, True))
+    return left, right
+
+
+def _styled(flights: Flights) -> list[tuple[FlightLog, dict[str, Any]]]:
+    """Each flight with colour, width and label; of one that ended early the label says how and when."""
+    styled: list[tuple[FlightLog, dict[str, Any]]] = []
+    for (name, log), colour in zip(flights.items(), COLOURS, strict=False):
+        early = log.outcome is not Outcome.COMPLETED
+        ended = f" ({log.outcome.value} at {log['time'][-1]:.4g} s)" if early else ""
+        width = _WIDE if len(flights) > 1 and not styled else _THIN
+        styled.append((log, {"color": colour, "lw": width, "label": name + ended}))
+    return styled
+
+
+def _thin(style: Mapping[str, Any]) -> dict[str, Any]:
+    return {"color": style["color"], "lw": 0.5, "alpha": 0.5}
+
+
+def _wind(axes: Axes, log: FlightLog) -> None:
+    """The steady wind, as an arrow in a corner, with its speed above the panel."""
+    north, east = log.flight.wind.steady
+    speed = math.hypot(north, east)
+    if speed:
+        x, y = 0.07 * east / speed, 0.07 * north / speed
+        tip, tail, arrow = (0.1 + x, 0.9 + y), (0.1 - x, 0.9 - y), {"arrowstyle": "->", "color": INK, "lw": 0.8}
+        axes.annotate("", tip, tail, "axes fraction", "axes fraction", arrow)
+        _title(axes, f"arrow: wind, {speed:.3g} m/s")
 
 
 def _title(axes: Axes, text: str) -> None:
-    axes.set_title(text, fontsize=9, loc="left", pad=3)
-
-
-def _names(logs: Sequence[FlightLog]) -> list[str]:
-    """The plant of each flight, numbered where two have the same."""
-    plants = [log.flight.plant for log in logs]
-    if len(set(plants)) == len(plants):
-        return plants
-    return [f"{number} {plant}" for number, plant in enumerate(plants, 1)]
+    axes.set_title(text, fontsize="medium", loc="left", pad=3)

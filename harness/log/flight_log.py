@@ -1,6 +1,7 @@
 """The log of a flight: one row per guidance period, a column per quantity."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -122,15 +123,19 @@ class FlightLog:
 
         return pd.DataFrame(self.table, columns=COLUMNS, copy=True)
 
-    def plot(self, *others: "FlightLog") -> "Figure":
-        """A matplotlib figure of this flight, and of `others` over it, up to six in all.
+    def plot(self, *others: "FlightLog", panels: Sequence[str] = ()) -> "Figure":
+        """A matplotlib figure of this flight, and of `others` over it, up to six in all, in the size of print.
 
-        The track with north up, the target and the standoff circle; over time the range error in m (linear within the
-        tolerance, logarithmic beyond), the heading rate in deg/s with its command, and bank and sideslip in deg where
-        the plant has them. A notebook shows the figure by itself.
+        `panels` chooses among those of `harness plot --what`: "track" with north up, the target and the standoff
+        circle; "error", the size of the range error in m on a log scale; "rate", heading rate, and "bank", each with
+        its command, in deg; "sideslip"; "spectrum" of the command while circling is judged. Without a choice all that
+        the plants have, of more than two flights the clearest. A notebook shows the figure by itself.
 
-        >>> log.plot().savefig("flight.png")
+        ValueError for what cannot be drawn: more flights than colours, a flight without a row, an unknown panel.
+
+        >>> log.plot().savefig("flight.pdf")
+        >>> log.plot(other, panels=["track", "error"])
         """
-        from harness.log.figure import picture
+        from harness.log.figure import named, picture
 
-        return picture((self, *others))
+        return picture(named((self, *others)), panels)

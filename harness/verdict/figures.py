@@ -5,12 +5,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from harness.log.metric import METRICS
+from harness.log.metric import METRICS, YES_OR_NO
 from harness.verdict.answer import place, plain, signed
 from harness.verdict.comparison import Scorecard
 from harness.verdict.effects import Ladder
+from harness.verdict.grid import Grid
+from harness.verdict.pairs import shown
 from harness.verdict.parts import Part
 from harness.vocabulary import Verdict
 
@@ -18,6 +22,10 @@ INK, GREY, UP, DOWN, BAND = "#1c2733", "#9aa5b1", "#c4501b", "#2a6f97", "#dfe8d8
 COLOURS = {Verdict.HOLDS: "#2d6a3e", Verdict.FAILS: "#a4361c", Verdict.UNDECIDED: "#5b6876"}
 MARKERS = {Verdict.HOLDS: "o", Verdict.FAILS: "X", Verdict.UNDECIDED: "D"}
 MOST_CELLS = 40  # drawn for a part
+SHADES, UNKNOWN, BORDER = "cividis", "#cccccc", "#D55E00"  # of maps, for colour-blind eyes too
+MOST_ACROSS, MOST_MAPS = 3, 12
+MOST_LEVEL = 8  # labels below a map
+MOST_NUMBERS = 60  # cells of a map: no numbers stand in more
 
 
 def intervals(figure: Figure, card: Scorecard, parts: Sequence[Part]) -> None:
@@ -75,3 +83,57 @@ def _falls(axes: Axes, ladder: Ladder) -> None:
     axes.tick_params(axis="y", labelsize=7)
     if np.isfinite(level) and min(ladder.start, ladder.end) >= 0:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+
+
+def heat_maps(figure: Figure, grids: Sequence[Grid]) -> None:
+    """Maps of one metric on one scale of colours; the line is the border beyond which a limit cycle is predicted."""
+    known = [cell.value for grid in grids for cell in grid.cells.values() if not math.isnan(cell.value)]
+    scale = _scale(known)
+    across = min(len(grids), MOST_ACROSS)
+    panels = figure.subplots(-(-len(grids) // across), across, squeeze=False)
+    for i, (axes, grid) in enumerate(zip(panels.flat, grids, strict=False)):
+        _map(axes, grid, scale)
+        axes.set_ylabel("" if i % across else grid.rows[0])
+    for axes in panels.flat[len(grids) :]:
+        axes.remove()
+    metric = METRICS[grids[0].metric]
+    unit = "share of flights" if metric.unit == YES_OR_NO else metric.label
+    beyond = {cell.beyond for grid in grids for cell in grid.cells.values()}
+    border = " (line: border of the predicted limit cycle)" if len(beyond) > 1 else ""
+    figure.suptitle(f"{metric.heading}, {unit}{border}", fontsize="medium")
+    figure.colorbar(ScalarMappable(scale, SHADES), ax=figure.axes, fraction=0.05, pad=0.02)
+
+
+def _scale(known: Sequence[float]) -> Normalize:
+    """Of colours: logarithmic where the values differ by decades."""
+    low, high = min(known, default=0.0), max(known, default=0.0)
+    if low > 0.0 and high > 100.0 * low:
+        return LogNorm(low, high)
+    return Normalize(low, high if high > low else low + 1.0)
+
+
+def _map(axes: Axes, grid: Grid, scale: Normalize) -> None:
+    (_, rows), (across, columns) = grid.rows, grid.columns
+    cells = [[grid.cells.get((row, column)) for column in columns] for row in rows]
+    values = np.array([[cell.value if cell else math.nan for cell in line] for line in cells])
+    axes.pcolormesh(values, cmap=SHADES, norm=scale)
+    axes.set_facecolor(UNKNOWN)
+    for y, line in enumerate(cells):
+        for x, cell in enumerate(line):
+            if len(rows) * len(columns) <= MOST_NUMBERS and cell and not math.isnan(cell.value):
+                ink = INK if scale(cell.value) > 0.5 else "white"
+                axes.text(x + 0.5, y + 0.5, grid.text(cell), ha="center", va="center", fontsize="x-small", color=ink)
+            beyond = cell is not None and cell.beyond
+            right = line[x + 1] if x + 1 < len(line) else None
+            above = cells[y + 1][x] if y + 1 < len(cells) else None
+            if right and cell and right.beyond is not beyond:
+                axes.plot([x + 1, x + 1], [y, y + 1], color=BORDER, lw=2.0)
+            if above and cell and above.beyond is not beyond:
+                axes.plot([x, x + 1], [y + 1, y + 1], color=BORDER, lw=2.0)
+    axes.set_xticks(
+        np.arange(len(columns)) + 0.5, [shown(value) for value in columns], rotation=90 * (len(columns) > 8)
+    )
+    axes.set_yticks(np.arange(len(rows)) + 0.5, [shown(value) for value in rows])
+    axes.grid(visible=False)
+    axes.set_xlabel(across)
+    axes.set_title("\n".join(f"{axis} = {shown(value)}" for axis, value in grid.at.items()), fontsize="small")

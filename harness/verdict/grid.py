@@ -48,7 +48,8 @@ class Grid:
     def title(self) -> str:
         metric = METRICS[self.metric]
         unit = " (share of flights)" if metric.unit == YES_OR_NO else ""
-        return f"{self.metric}{unit} at " + ", ".join(f"{axis} = {shown(value)}" for axis, value in self.at.items())
+        where = ", ".join(f"{axis} = {shown(value)}" for axis, value in self.at.items())
+        return f"{self.metric}{unit}" + (f" at {where}" if where else "")
 
     def shade(self, cell: GridCell) -> float:
         """How far up its value lies between the smallest of the map and the largest, 0 to 1."""
@@ -66,18 +67,24 @@ def grids(comparison: Comparison, metric: str) -> list[Grid]:
 
     Empty where fewer than two numeric axes vary. Raises `CompareError` for an unknown metric.
     """
+    return maps(comparison.table, comparison.axes, metric, [comparison.by])
+
+
+def maps(
+    entered: pd.DataFrame, axes: Mapping[str, Sequence[object]], metric: str, others: Sequence[str] = ()
+) -> list[Grid]:
+    """The same of flights as they enter a comparison, and what varies in them; `others` are told apart as well."""
     if metric not in METRICS:
         hint = did_you_mean(metric, METRICS)
-        raise CompareError(f"--map {metric}: no metric has this name{hint}; see `harness list metrics`")
-    numeric = [axis for axis, values in comparison.axes.items() if is_ordered(values)]
-    numeric = sorted(numeric, key=lambda axis: -len(comparison.axes[axis]))[:2]
+        raise CompareError(f"no metric has the name {metric!r}{hint}; see `harness list metrics`")
+    numeric = [axis for axis, values in axes.items() if is_ordered(values)]
+    numeric = sorted(numeric, key=lambda axis: -len(axes[axis]))[:2]
     if len(numeric) < 2:
         return []
-    first, second = (axis for axis in comparison.axes if axis in numeric)
-    flights = spread(comparison.table)
-    if comparison.by not in flights:
-        flights[comparison.by] = comparison.table[comparison.by]
-    fixed = [*(axis for axis in comparison.axes if axis not in numeric), comparison.by]
+    first, second = (axis for axis in axes if axis in numeric)
+    flights = spread(entered)
+    flights = flights.assign(**{name: entered[name] for name in others if name not in flights})
+    fixed = [*(axis for axis in axes if axis not in numeric), *others]
     found = []
     for at in product(*(ordered(flights[axis]) for axis in fixed)):
         there = pd.Series(True, index=flights.index)
@@ -86,7 +93,9 @@ def grids(comparison: Comparison, metric: str) -> list[Grid]:
         cells = {(row, column): _cell(rows, metric) for (row, column), rows in flights[there].groupby([first, second])}
         if cells:
             rows, columns = ((axis, ordered(flights.loc[there, axis])) for axis in (first, second))
-            found.append(Grid(metric, shown(at[-1]), dict(zip(fixed, at, strict=True)), rows, columns, cells))
+            found.append(
+                Grid(metric, shown(at[-1]) if at else "", dict(zip(fixed, at, strict=True)), rows, columns, cells)
+            )
     return found
 
 
