@@ -87,3 +87,27 @@ def test_the_flights_are_exported_with_their_units(out: Path, tmp_path: Path) ->
     assert invoke("export", out, "--to", "parquet", "--out", tmp_path / "flights.parquet").exit_code == 0
     metadata = pq.read_schema(tmp_path / "flights.parquet").field("command_activity_deg_s2").metadata
     assert metadata[b"unit"] == b"deg/s2"
+
+
+def test_one_flight_is_shown_with_every_setting_that_varies_in_its_run_also_where_it_is_the_default(out: Path) -> None:
+    key = harness.load_results(out).query("`law.k2` == 12.0 and seed == 0")["key"].item()
+    told = [line.split() for line in invoke("show", f"{out}:{key}").stdout.splitlines()]
+    assert ["law.k2", "12.0"] in told
+    assert ["seed", "0"] in told
+
+
+def test_a_flight_says_what_is_flown_how_it_ended_and_what_differs_from_an_earlier_one(out: Path) -> None:
+    flights = harness.load_results(out).query("seed == 0").set_index("law.k2").to_dict("index")
+    earlier, changed = flights[12.0], flights[4.0]
+    done = invoke("fly", f"{out}:{earlier['key']}", "--set", "law.k2=4", "--against", f"{out}:{earlier['key'][:9]}")
+    _, what, ending, settled, against, *lines = done.stdout.splitlines()
+    assert what == "law nftsm with gains paper_1, k2 = 4, on plant kinematic, for 100 s in still air, seed 0"
+    assert ending == "The flight lasted its full duration."
+    assert settled == f"The flight settled on its circle within 1 m in {changed['convergence_time_s']:.3g} s."
+    assert against == f"against flight {earlier['key'][:8]}: law.k2 4.0 instead of 12.0"
+    (peak,) = (line.split() for line in lines if line.startswith("range_error_peak_m"))
+    now, then = changed["range_error_peak_m"], earlier["range_error_peak_m"]
+    assert peak[1:5] == [f"{now:.3g}", f"{then:.3g}", f"{now - then:+.3g}", "m"]
+    same = invoke("fly", f"{out}:{earlier['key']}", "--against", f"{out}:{earlier['key']}")
+    assert "the same settings" in same.stdout
+    assert invoke("fly", f"{out}:{earlier['key']}", "--against", out).stderr.startswith(f"--against {out}: must be")

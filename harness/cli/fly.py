@@ -12,7 +12,7 @@ from harness.cli._paths import PATH, PATH_OR_ROW
 if TYPE_CHECKING:
     from harness.review.live import Live
     from harness.runs.recall import Recalled, RowAddress
-    from harness.runs.row import FlightResult
+    from harness.runs.row import FlightResult, FlightRow
 
 
 @click.command()
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     "--pace", type=click.FloatRange(0, min_open=True), help="Speed of --live, in times real time.  [default: 1]"
 )
 @click.option("--port", type=click.IntRange(1, 65535), help="Port of the viewer, for --live.  [default: 9876]")
+@click.option("--against", metavar="DIR:KEY", type=PATH_OR_ROW, help="Compare with this flight of a run.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def fly(
     what: str,
@@ -32,30 +33,34 @@ def fly(
     live: bool,
     pace: float | None,
     port: int | None,
+    against: str | None,
     as_json: bool,
 ) -> None:
     """Fly one flight and print its metrics.
 
     FILE describes the flight; DIR:KEY is a flight of a run, flown again and compared with what is stored, where the
-    beginning of the key is enough. Prints whether the circle can be held, a table of metrics, the outcome, the key
-    and the digest; warnings go to standard error. Exit code 1 when the computation failed.
+    beginning of the key is enough. Prints whether the circle can be held, what is flown, how it ended, a table of
+    metrics, the outcome, the key and the digest; warnings go to standard error. With --against also which settings
+    differ from those of an earlier flight, and each metric's difference to it. Exit code 1 when the computation failed.
 
     \b
     Examples:
       harness fly experiments/stationary.toml --rrd flight.rrd
       harness fly experiments/stationary.toml --set plant=kinematic --set law.name=smc --set law.gains=paper --json
       harness fly experiments/stationary.toml --live --pace 10
-      harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0]
+      harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0] --against out/wind:3f2a
     """
     from harness.cli._input import BadInput, flight_of, read_file, typed
     from harness.cli._paths import writable
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
     from harness.loop import simulate
-    from harness.runs.description import metric_lines
+    from harness.runs.description import changes, ending, flown, metric_lines
     from harness.runs.recall import row_address
     from harness.runs.row import json_of, result_of, row
 
+    if against is not None and as_json:
+        raise BadInput("--against and --json exclude each other")
     if not live and (pace is not None or port is not None):
         raise BadInput("--pace and --port require --live")
     place = row_address(what)
@@ -64,10 +69,13 @@ def fly(
     recalled = _recalled(place) if place else None
     settings = recalled.file(what, overrides) if recalled else read_file(Path(what), overrides)
     flight = flight_of(settings)
+    earlier = _earlier(against) if against is not None else None
     if rrd is not None:
         writable(rrd)
     stream = _stream(flight.plant, Path(what).stem, pace, port) if live else None
+    this = identity(flight)
     click.echo(feasibility_line(flight), err=as_json)
+    click.echo(flown(this.settings), err=as_json)
     for warning in warnings(flight):
         click.echo(f"warning: {warning}", err=True)
     log = simulate(flight, stream)
@@ -76,7 +84,7 @@ def fly(
         if stream.gone:
             click.echo("warning: the viewer was closed during the flight", err=True)
     result = result_of(log)
-    flight_row = row(flight, identity(flight), result)
+    flight_row = row(flight, this, result)
     if recalled and not overrides:
         flight_row.update(key=recalled.stored.row["key"], flight=recalled.stored.row["flight"])
         _compare(recalled, result)
@@ -87,7 +95,15 @@ def fly(
     if as_json:
         click.echo(json_of(flight_row))
     else:
-        for line in metric_lines(flight_row["metrics"]):
+        for line in ending(flight_row):
+            click.echo(line)
+        if earlier:
+            differing = changes(flight_row["flight"], earlier["flight"])
+            told = [f"{key} {now} instead of {then}" for key, (now, then) in differing.items()] or ["the same settings"]
+            if log.outcome != earlier["outcome"]:
+                told.append(f"{log.outcome} instead of {earlier['outcome']}")
+            click.echo(f"against flight {earlier['key'][:8]}: {', '.join(told)}")
+        for line in metric_lines(flight_row["metrics"], earlier and earlier["metrics"]):
             click.echo(line)
         click.echo(f"outcome: {log.outcome}{f': {log.reason}' if log.reason else ''}")
         click.echo(f"key {flight_row['key']}  digest {flight_row['digest']}")
@@ -104,6 +120,23 @@ def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live
         return Live(name, title, pace or 1.0, port or PORT)
     except ViewerError as error:
         raise BadInput(str(error)) from None
+
+
+def _earlier(text: str) -> FlightRow:
+    """The row of an earlier flight."""
+    from harness.cli._input import BadInput
+    from harness.runs.recall import row_address
+    from harness.runs.store import StoreError, find
+
+    place = row_address(text)
+    if place is None:
+        raise BadInput(
+            f"--against {text}: must be DIR:KEY, a folder that `harness run` wrote and the beginning of a key"
+        )
+    try:
+        return find(*place).row
+    except StoreError as error:
+        raise BadInput(f"--against {text}: {error}") from None
 
 
 def _recalled(place: RowAddress) -> Recalled:

@@ -46,7 +46,7 @@ def show(
     from harness.runs.recall import row_address
     from harness.runs.results import load_results
     from harness.runs.store import StoreError, find
-    from harness.verdict.pairs import CompareError
+    from harness.verdict.pairs import CompareError, varying
 
     address = row_address(row)
     if address is None and not Path(row).is_dir():
@@ -55,7 +55,8 @@ def show(
         raise BadInput(f"{row}: is one flight; --where, --sort, --columns, --limit and --csv are for a whole DIR")
     try:
         if address:
-            for line in description(address.folder, find(*address)):
+            stored = find(*address)
+            for line in description(address.folder, stored, varying(load_results(address.folder))):
                 click.echo(line)
             return
         flights = load_results(row)
