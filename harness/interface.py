@@ -112,8 +112,9 @@ def run(
     - `log`: which flights are recorded in OUT/flights: "all", "sample", "failed" or "none"; None is all of up to 50,
       else a sample.
     - `overrides`: texts KEY=VALUE that set a key for all flights, as `--set` of the command line does.
-    - `retry_failed`: fly those again that failed.
-    - `timeout`: s of wall time for one flight; None is 20 times its estimate.
+    - `retry_failed`: fly those again that are invalid; those that timed out or lost their worker are in any case.
+    - `timeout`: a flight hangs, and is ended, when it gains no simulated time while its worker computes for so many s;
+      None is 60.
     - `progress`: print how far it is to standard error, once a second.
 
     Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
@@ -128,6 +129,7 @@ def run(
     from harness.runs.run import LOGS, Options, positions_done
     from harness.runs.run import run as fly
     from harness.runs.survey import survey
+    from harness.runs.workers import TIMEOUT
     from harness.settings import read_settings
 
     for name, value, least in (("workers", workers, 0), ("limit", limit, 1)):
@@ -135,6 +137,8 @@ def run(
             raise ValueError(f"{name} is {value}, must be None or at least {least}")
     if timeout is not None and not timeout > 0.0:
         raise ValueError(f"timeout is {timeout:g}, must be None or above 0 s")
+    if timeout is not None and workers == 0:
+        raise ValueError("timeout needs a worker to end: workers must be None or at least 1")
     if log is not None and log not in LOGS:
         raise ValueError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
     path, out = Path(path), Path(out)
@@ -142,7 +146,7 @@ def run(
     matrix = read_matrix(read_settings(path, overrides), draft=True)
     for _ in survey(matrix, limit, positions_done(matrix, out, retry_failed=retry_failed)):
         pass  # every mistake is found before the first flight
-    options = Options(workers=workers, limit=limit, log=log, retry_failed=retry_failed, timeout=timeout)
+    options = Options(workers=workers, limit=limit, log=log, retry_failed=retry_failed, timeout=timeout or TIMEOUT)
     states = fly(matrix, out, options)
     for _ in _printed(states) if progress else states:
         pass

@@ -11,6 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from pebble import ProcessPool
@@ -46,10 +47,14 @@ def started(workers: int, prepare: Callable[..., None] | None = None, arguments:
 def ended(pool: ProcessPool) -> None:
     """Ends every worker at once, whatever it is at."""
     pool.stop()  # type: ignore[no-untyped-call]
-    for child in multiprocessing.active_children():
-        if child.name == WORKERS_NAME:
-            child.kill()
+    for worker in living():
+        worker.kill()
     pool.join()
+
+
+def living() -> list[BaseProcess]:
+    """The workers of all pools of this process that have not ended."""
+    return [child for child in multiprocessing.active_children() if child.name == WORKERS_NAME]
 
 
 def computed(jobs: Sequence[Callable[[], Result]], workers: int) -> Iterator[Result]:

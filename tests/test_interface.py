@@ -322,7 +322,7 @@ def test_a_run_returns_its_results_and_goes_on_where_it_was_stopped(tmp_path: Pa
 def test_an_interrupted_run_keeps_its_flights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     flights: list[harness.Flight] = []
 
-    def interrupted(flight: harness.Flight) -> harness.FlightLog:
+    def interrupted(flight: harness.Flight, watch: object) -> harness.FlightLog:
         if len(flights) == 2:
             raise KeyboardInterrupt
         flights.append(flight)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ _MOST_REASONS = 5
 _MOST_WARNINGS = 10
 
 
-def surveyed(matrix: Matrix, limit: int | None = None, done: frozenset[int] = frozenset()) -> Survey:
+def surveyed(matrix: Matrix, limit: int | None = None, done: Collection[int] = ()) -> Survey:
     """Checks every flight of the matrix that is not done. Raises `SettingsError`."""
     from rich.console import Console
 
@@ -104,7 +105,6 @@ def _fly(matrix: Matrix, out: Path, options: Options) -> Progress:
 def _print_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     """A table by the axes: medians over what is drawn, outcomes; then the failures, and where the results are."""
     from harness.log.metric import METRICS
-    from harness.plants.plant import Outcome
     from harness.runs.summary import summary
     from harness.tables import number, table
 
@@ -127,13 +127,23 @@ def _print_results(matrix: Matrix, out: Path, progress: Progress) -> None:
         click.echo(
             f"... and {counted(results.more, 'line')} more; all flights: harness.load_results({str(out)!r}) in Python"
         )
-    for reason, count in sorted(progress.reasons.items(), key=lambda item: -item[1])[:_MOST_REASONS]:
-        click.echo(f"failed: {count} x {reason}")
-    for problem in progress.recordings[:_MOST_REASONS]:
+    for failure, count in results.failures.most_common(_MOST_REASONS):
+        click.echo(f"failed: {count} x {failure.outcome}: {failure.reason}")
+    of_machine = sum(count for failure, count in results.failures.items() if failure.outcome.of_machine)
+    if of_machine:
+        click.echo(f"{counted(of_machine, 'flight')} failed; the same command flies them again")
+    if invalid := results.failures.total() - of_machine:
+        click.echo(f"{counted(invalid, 'flight')} failed; --retry failed flies them again")
+    for problem in progress.unrecorded[:_MOST_REASONS]:
         click.echo(f"warning: {problem}", err=True)
-    failed = sum(count for line in results.lines for outcome, count in line.outcomes.items() if Outcome(outcome).failed)
-    if failed:
-        click.echo(f"{counted(failed, 'flight')} failed; --retry failed flies them again")
+    if progress.unrecorded:
+        click.echo(f"{counted(len(progress.unrecorded), 'recording')} missing; the same command makes them up")
+    if progress.recorded:
+        click.echo(f"{counted(progress.recorded, 'earlier flight')} flown again for a recording that was missing")
+    if progress.repeated:
+        click.echo(
+            f"{counted(progress.repeated, 'flight')} of the matrix the same as another one: flown and counted once"
+        )
     click.echo(f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}")
 
 

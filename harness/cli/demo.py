@@ -52,4 +52,4 @@ def demo(out: Path) -> None:
         f"all flights and their keys: harness show {out}\n"
         f"the experiment, to copy and change: {EXPERIMENT}"
     )
-    raise SystemExit(1 if progress.failed else 0)
+    raise SystemExit(1 if progress.failed or progress.unrecorded else 0)

@@ -24,8 +24,8 @@ from harness.cli._paths import PATH
     metavar="KEY=VALUE",
     help="Set a key, or several values of it; repeatable.",
 )
-@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that failed.")
-@click.option("--flight-timeout", type=float, metavar="S", help="End a flight after S s. [default: 20 x its estimate]")
+@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
+@click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--dry-run", is_flag=True, help="Print the size of the matrix, its warnings and the time it takes.")
 def run(
     file: Path,
@@ -59,17 +59,19 @@ def run(
     from harness.runs.matrix import read_matrix
     from harness.runs.run import Options, positions_done
     from harness.runs.store import StoreError
-    from harness.runs.workers import WorkersError
+    from harness.runs.workers import TIMEOUT, WorkersError
     from harness.settings import SettingsError, read_settings
 
     if out is None and not dry_run:
         raise BadInput("--out DIR is missing: the folder of the results")
     if flight_timeout is not None and not flight_timeout > 0:
         raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
+    if flight_timeout is not None and workers == 0:
+        raise BadInput("--flight-timeout needs a worker to end: --workers must be at least 1")
     workers = (os.cpu_count() or 1) if workers is None else workers
     try:
         matrix = read_matrix(read_settings(file, overrides), draft=True)
-        done = positions_done(matrix, out, retry_failed=retry is not None) if out else frozenset[int]()
+        done = positions_done(matrix, out, retry_failed=retry is not None) if out else {}
         size = surveyed(matrix, limit, done)
         if out is not None and not dry_run:
             writable_folder(out)
@@ -77,11 +79,12 @@ def run(
         if dry_run or out is None:
             print_time(size, len(done), max(1, workers), log)
             return
-        options = Options(workers=workers, limit=limit, log=log, retry_failed=retry is not None, timeout=flight_timeout)
+        timeout = flight_timeout or TIMEOUT
+        options = Options(workers=workers, limit=limit, log=log, retry_failed=retry is not None, timeout=timeout)
         progress = fly_matrix(matrix, out, options)
     except (SettingsError, StoreError, WorkersError) as error:
         raise BadInput(str(error)) from None
     except OSError as error:
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
     click.echo(f"next: harness show {out}, harness compare {out}")
-    raise SystemExit(1 if progress.failed else 0)
+    raise SystemExit(1 if progress.failed or progress.unrecorded else 0)

@@ -37,6 +37,11 @@ class Outcome(StrEnum):
         return self in (Outcome.INVALID, Outcome.TIMEOUT, Outcome.WORKER_DIED)
 
     @property
+    def of_machine(self) -> bool:
+        """Whether the machine may be to blame, so that the same flight may go well next time."""
+        return self in (Outcome.TIMEOUT, Outcome.WORKER_DIED)
+
+    @property
     def sentence(self) -> str:
         """The outcome as a sentence without its full stop: a reason may follow after a colon."""
         return _SENTENCES[self]
@@ -49,7 +54,7 @@ _SENTENCES: Mapping[Outcome, str] = MappingProxyType(
         Outcome.DEPARTED: "The aircraft departed from controlled flight",
         Outcome.TARGET_LOST: "The aircraft lost the target",
         Outcome.INVALID: "The flight failed: a computed value is not valid",
-        Outcome.TIMEOUT: "The flight failed: it took too long to compute",
+        Outcome.TIMEOUT: "The flight failed: its computation hung",
         Outcome.WORKER_DIED: "The flight failed: the process that computed it died",
     }
 )

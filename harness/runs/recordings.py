@@ -4,6 +4,7 @@ from pathlib import Path
 
 from harness.files import make_folder
 from harness.log import FlightLog
+from harness.plants.plant import Outcome
 
 FOLDER = "flights"
 
@@ -19,6 +20,16 @@ def record(log: FlightLog, key: str, folder: Path) -> str:
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
     return ""
+
+
+def wanted(record: str, outcome: Outcome) -> bool:
+    """Whether a flight that ended so is recorded; `record` is all, failed (whatever ended it early) or none."""
+    return record == "all" or (record == "failed" and outcome is not Outcome.COMPLETED)
+
+
+def lacks_recording(folder: Path, key: str, record: str, outcome: Outcome) -> bool:
+    """Whether a finished flight is to be recorded and is not: the disk was full, or another command asked for less."""
+    return wanted(record, outcome) and not outcome.failed and not recording_path(folder, key).exists()
 
 
 def recording_path(folder: Path, key: str) -> Path:

@@ -12,7 +12,7 @@ from harness.flight import Flight
 from harness.key import Identity, identity
 from harness.log import COLUMNS, FlightLog
 from harness.log.metric import METRICS, measure
-from harness.loop import simulate
+from harness.loop import Watch, simulate
 from harness.plants.plant import Outcome, PlantError
 
 # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s: none without a limit, -inf where no heading
@@ -67,10 +67,10 @@ def failed_result(outcome: Outcome, reason: str) -> FlightResult:
     return FlightResult(outcome.value, reason, "", dict.fromkeys(METRICS), {}, None)
 
 
-def simulate_safely(flight: Flight) -> FlightLog:
+def simulate_safely(flight: Flight, watch: Watch | None = None) -> FlightLog:
     """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others."""
     try:
-        return simulate(flight)
+        return simulate(flight, watch)
     except Exception as error:  # any kind: the other flights of the run are unaffected
         reason = f"{error.key}: {error}" if isinstance(error, PlantError) else f"{type(error).__name__}: {error}"
         return FlightLog(flight, Outcome.INVALID, f"it cannot start: {reason}", np.empty((0, len(COLUMNS))))

@@ -1,18 +1,20 @@
 """A run: flies the flights of a matrix that are not done yet and keeps their rows in a store."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from harness.key import Identity, files, identity, version_of
 from harness.plants.plant import Outcome
 from harness.provenance import provenance
 from harness.runs.matrix import Matrix
+from harness.runs.recordings import lacks_recording, recording_path
 from harness.runs.row import row
 from harness.runs.store import JOURNAL, Store, examples, positions, reading
 from harness.runs.wall_time import WallTime
-from harness.runs.workers import Done, Fly, Task, WorkersError, fly_all, fly_task
+from harness.runs.workers import TIMEOUT, Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
 
 RECORDED = 50  # flights: a run of at most so many records all of them, a larger run a sample of this size
@@ -27,7 +29,7 @@ class Options:
     limit: int | None = None  # fly only so many flights, the first of the matrix
     log: str | None = None  # one of LOGS; None: all of up to `RECORDED` flights, otherwise a sample
     retry_failed: bool = False
-    timeout: float | None = None  # s per flight; None: 20 times the expected wall time
+    timeout: float = TIMEOUT  # s of a worker's own time in which a flight gains no simulated time
     fly: Fly = fly_task
 
 
@@ -38,10 +40,11 @@ class Progress:
     total: int
     earlier: int = 0  # done by an earlier run
     done: int = 0  # by this run, failed ones included
-    failed: int = 0
+    failed: int = 0  # by this run or an earlier one
+    repeated: int = 0  # the same as another flight of the matrix; not in `total`
     out: int = 0  # sent to the workers and not back
-    reasons: dict[str, int] = field(default_factory=dict)  # of failures, with their counts
-    recordings: list[str] = field(default_factory=list)  # what went wrong in writing them
+    recorded: int = 0  # of the earlier ones: flown again for a recording that is missing
+    unrecorded: list[str] = field(default_factory=list)  # what went wrong, for each recording that is missing
     seconds: float = 0.0  # since the first flight was sent out
     ahead: float = 0.0  # estimated time of one worker for the flights left, s
 
@@ -59,7 +62,7 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         store.begin(provenance(matrix.file.path, matrix.file.text, experiment.title, experiment.question))
         count = len(matrix)
         progress = Progress(count if options.limit is None else min(count, options.limit))
-        pending: dict[str, Identity] = {}
+        pending: dict[str, _Pending] = {}
         wall_time = WallTime()
         tasks = _tasks(matrix, store, options, progress, pending)
         flying = fly_all(
@@ -79,62 +82,79 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         yield progress
 
 
-def _keep(store: Store, done: Done, identity: Identity, progress: Progress) -> None:
+class _Pending(NamedTuple):
+    """A flight that was sent out."""
+
+    identity: Identity
+    earlier: Outcome | None  # how it ended when its row was made: it is flown again for its recording
+
+
+def _keep(store: Store, done: Done, pending: _Pending, progress: Progress) -> None:
     task, (result, version, problem) = done
+    outcome = Outcome(result.outcome)
     if version != task.version:
         raise WorkersError(
             "a law, an airframe or a track has changed during the run: run the same command again, in a notebook after "
             "a restart of its kernel"
         )
-    if problem:
-        progress.recordings.append(problem)
-    store.add_version(identity.version, files(task.flight))
-    store.add(row(task.flight, identity, result), result, version, task.position)
+    if problem or (pending.earlier and outcome.failed):
+        progress.unrecorded.append(problem or f"{recording_path(store.folder, task.key)}: {outcome}: {result.reason}")
+    if pending.earlier:
+        progress.recorded += 1
+        _count_earlier(progress, pending.earlier)
+        return
+    store.add_version(pending.identity.version, files(task.flight))
+    store.add(row(task.flight, pending.identity, result), result, version, task.position)
     progress.done += 1
-    if Outcome(result.outcome).failed:
-        progress.failed += 1
-        reason = f"{result.outcome}: {result.reason}"
-        progress.reasons[reason] = progress.reasons.get(reason, 0) + 1
+    progress.failed += outcome.failed
+
+
+def _count_earlier(progress: Progress, outcome: Outcome) -> None:
+    progress.earlier += 1
+    progress.failed += outcome.failed
 
 
 def _tasks(
-    matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, Identity]
+    matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, _Pending]
 ) -> Iterator[Task]:
-    """The flights that are not done yet, one at a time, each entered in `pending`."""
+    """The flights that are not done yet or lack their recording, one at a time, each entered in `pending`."""
     number = matrix.identifier
     finished = positions_done(matrix, store.folder, retry_failed=options.retry_failed)
-    known = store.keys(failed=not options.retry_failed)
+    known = store.done(retry_failed=options.retry_failed)
     recorded = _recorded(matrix, options, progress.total)
-    flights = 0
+    met: set[str] = set()
+    left = progress.total
     for position in range(matrix.positions):
-        if flights >= progress.total:
+        if not left:
             return
-        if position in finished:
-            flights += 1
-            progress.earlier += 1
-            continue
-        combination = matrix.at(position)
-        if combination is None:
-            continue
-        flights += 1
-        flight = matrix.flight(combination)
-        this = identity(flight)
-        store.place(number, position, this.key)
-        if this.key in known:
-            progress.earlier += 1
-            continue
-        known.add(this.key)
-        pending[this.key] = this
-        yield Task(this.key, position, flight, this.version.number, recorded(position))
+        record, key, this = recorded(position), finished.get(position), None
+        if key is None or lacks_recording(store.folder, key, record, known[key]):
+            combination = matrix.at(position)
+            if combination is None:
+                continue
+            flight = matrix.flight(combination)
+            this = identity(flight)
+            key = this.key
+            store.place(number, position, key)
+        left -= 1
+        earlier = known.get(key)
+        if key in met:
+            progress.repeated, progress.total = progress.repeated + 1, progress.total - 1
+        elif earlier and not (this and lacks_recording(store.folder, key, record, earlier)):
+            _count_earlier(progress, earlier)
+        elif this:
+            pending[key] = _Pending(this, earlier)
+            yield Task(key, position, flight, this.version.number, record)
+        met.add(key)
 
 
-def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> frozenset[int]:
-    """The positions of the matrix whose flights are done with today's code and files.
+def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> Mapping[int, str]:
+    """The key of each flight of the matrix that is done with today's code and files, by its position.
 
     They are read from the store, without expanding the matrix. Raises `StoreError`.
     """
     if not (folder / JOURNAL).exists():
-        return frozenset()
+        return {}
     with reading(folder) as journal:
         current = []
         for version, settings in examples(journal):
@@ -144,7 +164,7 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> froze
                 continue  # its files are gone
             if now.number == version:
                 current.append(version)
-        return frozenset(positions(journal, matrix.identifier, current, failed=not retry_failed))
+        return positions(journal, matrix.identifier, current, retry_failed=retry_failed)
 
 
 def _recorded(matrix: Matrix, options: Options, total: int) -> Callable[[int], str]:

@@ -46,8 +46,6 @@ PRAGMA application_id = {_APPLICATION};
 _UPGRADES = {  # by format, what makes the next one of it
     1: f"DROP TABLE changes; CREATE TABLE state (id TEXT NOT NULL); INSERT INTO state VALUES ({_RANDOM});",
 }
-_FAILURES = tuple(outcome.value for outcome in Outcome if outcome.failed)
-_FAILED = f"outcome IN ({', '.join(repr(value) for value in _FAILURES)})"
 
 
 class StoreError(HarnessError):
@@ -146,9 +144,10 @@ class Store:
         """Records that the flight at this position of a matrix has this key."""
         self._change("INSERT OR REPLACE INTO positions VALUES (?, ?, ?)", (matrix, position, key))
 
-    def keys(self, *, failed: bool = True) -> set[str]:
-        """The keys of all rows; without `failed`, only of those that did not fail."""
-        return {key for (key,) in self._all("SELECT key FROM flights" + ("" if failed else f" WHERE NOT {_FAILED}"))}
+    def done(self, *, retry_failed: bool) -> dict[str, Outcome]:
+        """The outcome of each row that is not to be flown again, by its key."""
+        rows = self._all(f"SELECT key, outcome FROM flights WHERE {_done(retry_failed)}")
+        return {key: Outcome(outcome) for key, outcome in rows}
 
     def commit(self) -> None:
         """Commits all changes."""
@@ -215,15 +214,23 @@ def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
     return [(version, json.loads(settings)) for version, settings in rows]
 
 
-def positions(journal: sqlite3.Connection, matrix: str, versions: Sequence[str], *, failed: bool) -> set[int]:
-    """The positions of a matrix whose flight is done in one of these versions; failed flights only if `failed`."""
-    rows = journal.execute(
-        "SELECT p.position FROM positions p JOIN flights f USING (key) "
-        f"WHERE p.matrix = ? AND f.version IN ({', '.join('?' * len(versions))})"
-        + ("" if failed else f" AND NOT {_FAILED}"),
-        (matrix, *versions),
+def positions(
+    journal: sqlite3.Connection, matrix: str, versions: Sequence[str], *, retry_failed: bool
+) -> dict[int, str]:
+    """The key of each flight of a matrix that is done in one of these versions, by its position."""
+    return dict(
+        journal.execute(
+            "SELECT p.position, p.key FROM positions p JOIN flights f USING (key) "
+            f"WHERE p.matrix = ? AND f.version IN ({', '.join('?' * len(versions))}) AND {_done(retry_failed)}",
+            (matrix, *versions),
+        )
     )
-    return {position for (position,) in rows}
+
+
+def _done(retry_failed: bool) -> str:
+    """The condition that a row is not to be flown again. What the machine may be to blame for is always flown again."""
+    again = [outcome for outcome in Outcome if outcome.of_machine or (retry_failed and outcome.failed)]
+    return f"outcome NOT IN ({', '.join(repr(outcome.value) for outcome in again)})"
 
 
 def find(folder: Path, beginning: str) -> Stored:

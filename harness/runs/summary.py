@@ -2,11 +2,13 @@
 
 import json
 import statistics
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from harness.log.metric import METRICS, YES_OR_NO
+from harness.plants.plant import Outcome
 from harness.runs.matrix import Matrix
 from harness.runs.store import reading
 from harness.settings.columns import by_column
@@ -25,12 +27,20 @@ class Line(NamedTuple):
         return sum(self.outcomes.values())
 
 
+class Failure(NamedTuple):
+    """How a flight failed."""
+
+    outcome: Outcome
+    reason: str
+
+
 class Summary(NamedTuple):
     """Results by the axes of a matrix."""
 
     axes: Sequence[str]  # keys that vary together are joined by commas
     lines: Sequence[Line]  # in the order of the matrix
     more: int  # the number of lines left out
+    failures: Counter[Failure]  # in all lines
 
 
 def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
@@ -39,13 +49,16 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
     keys = [axis.split(", ") for axis in axes]
     groups: dict[tuple[str, ...], _Group] = {}
     left_out: set[tuple[str, ...]] = set()
+    failures: Counter[Failure] = Counter()
     with reading(folder) as journal:
         rows = journal.execute(
-            "SELECT p.position, f.outcome, f.settings, f.metrics FROM positions p JOIN flights f USING (key) "
+            "SELECT p.position, f.outcome, f.reason, f.settings, f.metrics FROM positions p JOIN flights f USING (key) "
             "WHERE p.matrix = ? ORDER BY p.position",
             (matrix.identifier,),
         )
-        for position, outcome, settings, metrics in rows:
+        for position, outcome, reason, settings, metrics in rows:
+            if Outcome(outcome).failed:
+                failures[Failure(Outcome(outcome), reason)] += 1
             columns = by_column(json.loads(settings))
             combination = matrix.at(position)
             columns |= dict.fromkeys(combination.drawn if combination else (), "drawn")
@@ -54,7 +67,7 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
                 left_out.add(labels)
             else:
                 groups.setdefault(labels, _Group()).add(outcome, json.loads(metrics))
-    return Summary(axes, [group.line(labels) for labels, group in groups.items()], len(left_out))
+    return Summary(axes, [group.line(labels) for labels, group in groups.items()], len(left_out), failures)
 
 
 class _Group:

@@ -1,6 +1,6 @@
 """The size of a matrix before it is flown: every mistake in it, its warnings, how long it takes."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from harness.feasibility import warnings
@@ -40,7 +40,7 @@ def disk(total: Survey, recorded: int) -> float:
     return total.flights * _ROW_BYTES + min(recorded, total.flights) * each
 
 
-def survey(matrix: Matrix, limit: int | None = None, done: frozenset[int] = frozenset()) -> Iterator[Survey]:
+def survey(matrix: Matrix, limit: int | None = None, done: Collection[int] = ()) -> Iterator[Survey]:
     """Checks all flights of the matrix, which may be a draft, except those at the positions `done`.
 
     Yields the survey so far every 500 flights, and the complete survey at the end. Raises `SettingsError` at the end

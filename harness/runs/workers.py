@@ -1,10 +1,12 @@
 """Worker processes that fly flights; a worker that dies or hangs costs one flight.
 
 Flights are sent in chunks, because a kinematic flight takes little longer than a message. Each worker notes in shared
-memory which flight of its chunk it flies and since when. So a death or a hang loses that flight alone: the rest of the
-chunk is flown again.
+memory which flight of its chunk it flies, and the simulated time. So a death or a hang loses that flight alone: the
+rest of the chunk is flown again. A flight hangs when it gains no simulated time although its worker had time for it,
+however slow the machine is.
 """
 
+import os
 import pickle
 import time
 import zlib
@@ -22,18 +24,23 @@ from harness.error import HarnessError
 from harness.flight import Flight
 from harness.key import version_of
 from harness.plants.plant import Outcome
-from harness.pool import SPAWN, ended, started
+from harness.pool import SPAWN, ended, living, started
+from harness.runs.own_time import OwnTime
+from harness.runs.recordings import record, wanted
 from harness.runs.row import FlightResult, failed_result, result_of, simulate_safely
 from harness.runs.wall_time import CHUNK, WallTime
 
 AHEAD = 2  # chunks sent out per worker: one is flown, one waits
-SHORTEST_TIMEOUT = 10.0  # s: with a shorter one, flights would time out because the machine is busy
-_RECORDING = 60.0  # s added to the timeout of a flight that is recorded
-_STALLED = 30.0  # s without any busy worker, after which all are restarted
+TIMEOUT = 60.0  # s of a worker's own time in which a flight gains no simulated time
+_ASIDE = 60.0  # s more before a flight's first row and after its last: start, metrics, recording
+_STALLED = 30.0  # s that all workers are blocked with no flight begun, after which they are replaced
+_LOOK_EVERY = 0.2  # s, at the workers
 _MOST_RESTARTS = 3  # of the workers, with no flight done in between
 _MOST_TASKS = 64  # in a chunk
 _PIPE = 48_000  # bytes of waiting messages: a full pipe blocks this process, for ever if all workers are dead
 _NONE = -1  # no flight of the chunk has begun
+_NOT_IN_FLIGHT = -1.0  # for the simulated time, before a flight's first row and after its last
+_NOTES = 3  # numbers that a worker notes: which flight of its chunk, the simulated time in s, its process
 
 
 class WorkersError(HarnessError):
@@ -71,12 +78,11 @@ Fly = Callable[[Task, Path], WorkerResult]
 def fly_task(task: Task, folder: Path) -> WorkerResult:
     """Flies a task, in a worker, and writes its recording if the task asks for one."""
     begin = time.perf_counter()
-    log = simulate_safely(task.flight)
+    log = simulate_safely(task.flight, _note)
+    _note(_NOT_IN_FLIGHT)
     result = result_of(log, time.perf_counter() - begin)
     problem = ""
-    if task.record == "all" or (task.record == "failed" and log.outcome is not Outcome.COMPLETED):
-        from harness.runs.recordings import record
-
+    if wanted(task.record, log.outcome):
         problem = record(log, task.key, folder)
     return WorkerResult(result, version_of(task.flight).number, problem)
 
@@ -90,8 +96,17 @@ class _Chunk:
     tasks: Sequence[Task]
     slot: int = 0  # its place in the shared memory
     size: int = 0  # bytes, of its message
-    hung: int | None = None  # the number of the flight that took too long
+    worker: OwnTime | None = None
+    at: tuple[float, float] = (_NONE, _NOT_IN_FLIGHT)  # the flight and its simulated time when last looked at
+    stuck: float = 0.0  # own time of the worker since that changed, s
+    hung: int | None = None  # the number of the flight that hangs
     deaths: int = 0  # of workers that held it but had not begun any of its flights
+
+
+def _how_hung(chunk: _Chunk) -> str:
+    simulated = chunk.at[1]
+    where = "before its first row or after its last" if simulated == _NOT_IN_FLIGHT else f"at {simulated:.6g} s"
+    return f"{where} it gained no simulated time in {chunk.stuck:.3g} s of its worker's own time"
 
 
 def fly_all(
@@ -100,7 +115,7 @@ def fly_all(
     *,
     workers: int,
     wall_time: WallTime,
-    timeout: float | None = None,
+    timeout: float = TIMEOUT,
     fly: Fly = fly_task,
 ) -> Generator[Done | None]:
     """Flies the tasks and yields each when it is done, in any order; None now and then while there is nothing to yield.
@@ -119,20 +134,22 @@ class _Flying:
     """The state of `fly_all`."""
 
     def __init__(
-        self, tasks: Iterator[Task], folder: Path, workers: int, wall_time: WallTime, timeout: float | None, fly: Fly
+        self, tasks: Iterator[Task], folder: Path, workers: int, wall_time: WallTime, timeout: float, fly: Fly
     ) -> None:
         self.tasks, self.folder, self.workers, self.timeout, self.fly = tasks, folder, workers, timeout, fly
         self.wall_time = wall_time
         self.again: deque[_Chunk] = deque()  # to be flown again
         self.out: dict[Future[list[WorkerResult | str]], _Chunk] = {}
-        # For each slot: which flight of its chunk is flown, and since when (all processes share the monotonic clock).
-        # A worker that is being ended may still write to its slot, so a slot is reused as late as possible.
+        # For each slot what its worker notes. One that is being ended may still write, so a slot is reused as late as
+        # possible.
         slots = 16 * AHEAD * workers
-        self.begun = SPAWN.RawArray("d", 2 * slots)
+        self.notes = SPAWN.RawArray("d", _NOTES * slots)
         self.slots = deque(range(slots))
         self.pool = self._pool()
         self.restarts = 0  # since a flight was done
-        self.moved = time.monotonic()  # the last time a worker was busy
+        self.idle: dict[int, OwnTime] = {}  # the workers by their process, while none has begun a flight
+        self.stalled = 0.0  # for how long all of these have been blocked, s
+        self.looked = time.monotonic()
 
     def results(self) -> Iterator[Done | None]:
         try:
@@ -144,17 +161,18 @@ class _Flying:
                     if chunk := self.out.pop(future, None):
                         self.slots.append(chunk.slot)
                         yield from self._received(chunk, future)
-                self._end_hung()
-                if done or any(future.running() for future in self.out):
-                    self.moved = time.monotonic()
-                elif time.monotonic() - self.moved > _STALLED:  # a worker was killed while it held the lock they share
-                    self._restart()
+                if done:
+                    self.idle, self.stalled = {}, 0.0
+                if time.monotonic() - self.looked > _LOOK_EVERY:
+                    self.looked = time.monotonic()
+                    self._end_hung()
+                    self._replace_stalled()
         finally:
             ended(self.pool)
 
     def _pool(self) -> ProcessPool:
-        pool = started(self.workers, _prepare, (self.begun, self.folder, self.fly))
-        self.moved = time.monotonic()
+        pool = started(self.workers, _prepare, (self.notes, self.folder, self.fly))
+        self.idle, self.stalled = {}, 0.0
         return pool
 
     def _restart(self) -> None:
@@ -184,8 +202,8 @@ class _Flying:
             if waiting and waiting + len(message) > _PIPE:
                 self.again.appendleft(chunk)
                 break
-            chunk.slot, chunk.size, chunk.hung = self.slots.popleft(), len(message), None
-            self.begun[2 * chunk.slot] = _NONE
+            chunk.slot, chunk.size, chunk.worker, chunk.hung = self.slots.popleft(), len(message), None, None
+            self.notes[_NOTES * chunk.slot] = _NONE
             try:
                 future = self.pool.schedule(_fly_chunk, args=(chunk.slot, message))
             except RuntimeError:  # the pool is broken
@@ -206,18 +224,29 @@ class _Flying:
         return _Chunk(tasks) if tasks else None
 
     def _end_hung(self) -> None:
-        """Ends every worker whose flight takes longer than its timeout."""
+        """Ends every worker whose flight has gained no simulated time in the time that the worker had for it."""
         for future, chunk in self.out.items():
-            number, since = self.begun[2 * chunk.slot : 2 * chunk.slot + 2]
+            number, simulated, process = self.notes[_NOTES * chunk.slot : _NOTES * (chunk.slot + 1)]
             if number == _NONE or chunk.hung is not None:
                 continue
-            if time.monotonic() - since > self._limit(chunk.tasks[int(number)]):
+            if chunk.worker is None or chunk.at != (number, simulated):
+                chunk.worker, chunk.at, chunk.stuck = OwnTime(int(process)), (number, simulated), 0.0
+                continue
+            chunk.stuck += sum(chunk.worker.since_last_look())
+            if chunk.stuck > self.timeout + (_ASIDE if simulated == _NOT_IN_FLIGHT else 0.0):
                 chunk.hung = int(number)
                 future.cancel()  # Pebble ends the worker of a running task that is cancelled
 
-    def _limit(self, task: Task) -> float:
-        limit = self.timeout or max(SHORTEST_TIMEOUT, 20.0 * self.wall_time.seconds(task.flight))
-        return limit + (_RECORDING if task.record != "none" else 0.0)
+    def _replace_stalled(self) -> None:
+        """Replaces all workers if they only wait: one was killed while it held the lock that they share."""
+        if any(future.running() for future in self.out):
+            self.idle, self.stalled = {}, 0.0
+            return
+        processes = [worker.pid for worker in living() if worker.pid]
+        looks = [self.idle.setdefault(pid, OwnTime(pid)).since_last_look() for pid in processes]
+        self.stalled += min((look.blocked for look in looks), default=0.0)
+        if self.stalled > _STALLED:
+            self._restart()
 
     def _received(self, chunk: _Chunk, future: Future[list[WorkerResult | str]]) -> Iterator[Done]:
         try:
@@ -239,7 +268,7 @@ class _Flying:
 
     def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:
         """The worker of the chunk died or was ended: the flight it flew is lost, the others are flown again."""
-        at = int(self.begun[2 * chunk.slot]) if chunk.hung is None else chunk.hung
+        at = int(self.notes[_NOTES * chunk.slot]) if chunk.hung is None else chunk.hung
         rest = list(chunk.tasks)
         if at != _NONE:
             task = rest.pop(at)
@@ -248,7 +277,7 @@ class _Flying:
                 code = getattr(error, "exitcode", None)
                 yield _failed(task, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
             else:
-                yield _failed(task, Outcome.TIMEOUT, f"ended after {self._limit(task):.3g} s")
+                yield _failed(task, Outcome.TIMEOUT, _how_hung(chunk))
         else:  # between two flights: none of them is to blame
             chunk.deaths += 1
             if chunk.deaths > _MOST_RESTARTS:
@@ -262,21 +291,28 @@ class _Flying:
 _SHARED: dict[str, Any] = {}  # set once per process by `_prepare`
 
 
-def _prepare(begun: Any, folder: Path, fly: Fly) -> None:
-    _SHARED.update(begun=begun, folder=folder, fly=fly)
+def _prepare(notes: Any, folder: Path, fly: Fly) -> None:
+    _SHARED.update(notes=notes, folder=folder, fly=fly)
+
+
+def _note(simulated: float, so_far: object = None) -> None:
+    """Notes the simulated time, s: called after each row. Does nothing in a process that is no worker."""
+    if _SHARED:
+        _SHARED["notes"][_SHARED["at"]] = simulated
 
 
 def _fly_chunk(slot: int, message: bytes) -> list[WorkerResult | str]:
     """For each task of a message its result, or in words what went wrong."""
     tasks: list[Task] = pickle.loads(zlib.decompress(message))
-    begun, folder, fly = _SHARED["begun"], _SHARED["folder"], _SHARED["fly"]
+    notes, folder, fly = _SHARED["notes"], _SHARED["folder"], _SHARED["fly"]
+    _SHARED["at"] = _NOTES * slot + 1
     answers: list[WorkerResult | str] = []
     for number, task in enumerate(tasks):
-        begun[2 * slot + 1] = time.monotonic()
-        begun[2 * slot] = float(number)
+        notes[_NOTES * slot + 1 : _NOTES * (slot + 1)] = [_NOT_IN_FLIGHT, os.getpid()]
+        notes[_NOTES * slot] = float(number)
         try:
             answers.append(fly(task, folder))
         except Exception as error:  # a fault of the harness, or a missing file: it concerns this flight only
             answers.append(f"it could not be flown: {type(error).__name__}: {error}")
-    begun[2 * slot] = _NONE
+    notes[_NOTES * slot] = _NONE
     return answers
