@@ -102,7 +102,9 @@ def warnings(flight: Flight) -> list[str]:
                 f"the heading-rate limit needs {math.degrees(needed):.0f} deg of bank, the inner loop allows "
                 f"{math.degrees(limits.bank):.0f} deg"
             )
-    return sentences + flight.law.broken_conditions(ratio)
+    if broken := flight.law.broken_conditions(ratio):
+        sentences.append(f"the law is flown outside its conditions: {'; '.join(broken)}")
+    return sentences
 
 
 def _outrun(flight: Flight) -> str:

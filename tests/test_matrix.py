@@ -237,14 +237,22 @@ def test_the_survey_counts_and_tells_idle_seeds(matrix: Read) -> None:
     text = '[matrix]\nseed = { start = 0, count = 3 }\n"law.max_heading_rate_deg_s" = [1.0, 5.0]\n'
     *_, found = survey(matrix(text))
     assert (found.flights, found.idle_seeds) == (6, 3)
-    (infeasible,) = (number for warning, number in found.warnings.items() if "infeasible" in warning)
-    assert infeasible == 3
+    (infeasible,) = (warned for warned in found.warnings.values() if "infeasible" in warned.text)
+    assert (infeasible.flights, infeasible.alike) == (3, True)
     assert found.varies == {"seed": 3, "law.max_heading_rate_deg_s": 2}
     *_, noisy = survey(matrix(text, "estimator.kind=ekf"))
     *_, drawn = survey(matrix(text + '"start.heading_deg" = { uniform = [0, 9] }\n'))
     assert noisy.idle_seeds == drawn.idle_seeds == 0
     *_, limited = survey(matrix(text), limit=4)
     assert limited.flights == 4
+
+
+def test_warnings_that_differ_in_their_numbers_alone_are_one(matrix: Read) -> None:
+    *_, found = survey(matrix('[matrix]\n"wind.steady_mps" = [[0, 0], [1, 0], [2, 0]]\n'))
+    (warned,) = found.warnings.values()
+    assert (warned.flights, warned.alike) == (3, False)
+    assert "Eq. (28)" in warned.text
+    assert "Eq. (30)" in warned.text
 
 
 def test_a_file_without_a_matrix_is_one_flight(matrix: Read) -> None:

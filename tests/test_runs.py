@@ -431,7 +431,7 @@ def test_a_dry_run_tells_the_size_and_writes_nothing(file: Path, tmp_path: Path)
     ]
     assert lines[6].startswith("about 1 s with ")
     assert "warning: 10 of 10 flights: the circle is infeasible" in done.stderr
-    assert "warning: 10 of 10 flights: Eq. (28)" in done.stderr
+    assert "warning: 10 of 10 flights: the law is flown outside its conditions: Eq. (28)" in done.stderr
     assert list(tmp_path.iterdir()) == [file]
     assert (
         "the 5 seeds repeat the same flight"

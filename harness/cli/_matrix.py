@@ -43,8 +43,9 @@ def print_survey(matrix: Matrix, size: Survey, done: int) -> None:
     for key in matrix.draws:
         click.echo(f"  {key}: drawn from the seed")
     of = f"{counted(size.flights - done, 'flight')} to fly" if done else counted(size.flights, "flight")
-    for warning, count in list(size.warnings.items())[:_MOST_WARNINGS]:
-        click.echo(f"warning: {count} of {of}: {warning}", err=True)
+    for warning in list(size.warnings.values())[:_MOST_WARNINGS]:
+        first = "" if warning.alike else " (the numbers are of the first of them)"
+        click.echo(f"warning: {warning.flights} of {of}: {warning.text}{first}", err=True)
     if (more := len(size.warnings) - _MOST_WARNINGS) > 0:
         click.echo(f"warning: and {counted(more, 'more warning')}", err=True)
     if size.idle_seeds and not done:

@@ -1,5 +1,6 @@
 """The size of a matrix before it is flown: every mistake in it, its warnings, how long it takes."""
 
+import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
@@ -11,8 +12,18 @@ from harness.settings import SettingsError
 
 _ROW_BYTES = 4500  # in the journal and in flights.parquet
 _RECORDED_BYTES = 450  # per guidance period, in a recording
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _MOST_MISTAKES = 50
 _MOST_STARTS = 200  # tried before the run; beyond it, a flight that cannot start becomes a row of the run
+
+
+@dataclass(slots=True)
+class Warned:
+    """A warning that flights share, but for the numbers in it."""
+
+    text: str  # of the first of them
+    flights: int = 0
+    alike: bool = True  # whether all have the same numbers
 
 
 @dataclass(slots=True)
@@ -25,7 +36,7 @@ class Survey:
     periods: int = 0  # guidance periods, of all flights together
     mistakes: list[str] = field(default_factory=list)
     varies: dict[str, int] = field(default_factory=dict)  # the number of values of each axis
-    warnings: dict[str, int] = field(default_factory=dict)  # with the number of flights that each is about
+    warnings: dict[str, Warned] = field(default_factory=dict)  # by their text without numbers
 
     @property
     def idle_seeds(self) -> int:
@@ -70,7 +81,9 @@ def survey(matrix: Matrix, limit: int | None = None, done: Collection[int] = ())
                 break
             continue
         for warning in flight.warnings:
-            total.warnings[warning] = total.warnings.get(warning, 0) + 1
+            shared = total.warnings.setdefault(_NUMBER.sub("#", warning), Warned(warning))
+            shared.flights += 1
+            shared.alike &= warning == shared.text
         total.random += flight.random or bool(matrix.draws)
         total.seconds += flight.seconds
         total.periods += flight.periods
