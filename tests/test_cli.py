@@ -128,7 +128,7 @@ def test_a_broken_airframe_is_one_line_that_names_its_file(
     file: Path, broken: str, old: str, new: str | None, told: str
 ) -> None:
     airframe = copied_airframe("ultra_stick_25e", file.parent / "plane")
-    flown = ("plant=sixdof", "aircraft=plane")  # beside the settings file
+    flown = ("plant=sixdof", f"aircraft={airframe}")
     flight = flight_of(read_file(file, flown))
     assert flight.aircraft == str(airframe)
     text = (airframe / broken).read_text(encoding="utf-8")
@@ -140,7 +140,8 @@ def test_a_broken_airframe_is_one_line_that_names_its_file(
     with pytest.raises(BadInput) as caught:
         flight_of(read_file(file, flown))
     (line,) = caught.value.message.splitlines()
-    assert line.startswith(f"--set aircraft=plane: flight.aircraft: {airframe}")
+    assert line.startswith("--set aircraft=")
+    assert f": flight.aircraft: {airframe}" in line
     assert told in line
 
 

@@ -14,6 +14,7 @@ from autopilot.smc import Smc
 from harness.feasibility import feasibility_margin, warnings
 from harness.flight import Flight
 from harness.plants.plant import Start
+from harness.runs.matrix import read_matrix
 from harness.settings import (
     SettingsError,
     document,
@@ -24,7 +25,7 @@ from harness.settings import (
     read_settings,
 )
 from harness.world.target import Segment
-from tests.builders import EXPERIMENTS, python
+from tests.builders import EXPERIMENTS, copied_airframe, python
 
 STATIONARY = EXPERIMENTS / "stationary.toml"
 SHORTEST = '[flight]\nplant = "kinematic"\n[flight.law]\nname = "nftsm"\n'
@@ -288,6 +289,26 @@ def test_whatever_a_key_is_set_to_there_is_a_flight_that_can_be_told_or_lines_th
         json.dumps([document(flight), warnings(flight), feasibility_margin(flight)])
     assert len(flights) > 20
     assert len(told) > 500
+
+
+def test_a_path_of_the_file_starts_at_its_folder_and_one_of_an_override_at_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there, here = tmp_path / "there", tmp_path / "here"
+    for folder in (there, here):
+        copied_airframe("ultra_stick_25e", folder / "plane")
+        (folder / "track.csv").write_text("time_s,north_m,east_m\n0,0,0\n30,3,0\n60,6,0\n100,10,0\n")
+    monkeypatch.chdir(here)
+    file = there / "a.toml"
+    file.write_text(SHORTEST.replace("[flight]", '[flight]\naircraft = "plane"\ntarget.track = "track.csv"'))
+    flight = load_flight(file)
+    assert (flight.aircraft, flight.target.track) == (str(there / "plane"), str(there / "track.csv"))
+    flight = load_flight(file, ["aircraft=plane", "target.track=track.csv"])
+    assert (flight.aircraft, flight.target.track) == (str(here / "plane"), str(here / "track.csv"))
+    axes = ['aircraft=["plane", "skywalker_x8"]', "target.track=track.csv"]
+    matrix = read_matrix(read_settings(file, axes))
+    flights = [matrix.flight(combination) for combination in matrix.combinations()]
+    assert [flight.aircraft for flight in flights] == [str(here / "plane"), "skywalker_x8"]
 
 
 # What a file leaves to the airframe's speed

@@ -98,6 +98,7 @@ def load_flight(path: str | Path, overrides: Sequence[str] = ()) -> Flight:
     """The flight that a settings file (TOML) describes.
 
     `overrides` are texts KEY=VALUE, keys dotted below [flight], in the file's units: degrees, where a key ends so.
+    Relative paths start at the folder of the file, those of `overrides` at the working folder.
 
     Raises `SettingsError` with every mistake, each with its line and what is allowed; also when it cannot be read.
 
@@ -126,7 +127,10 @@ def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> 
 
 
 def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
-    """The file with the texts KEY=VALUE merged into its [flight]. Raises `SettingsError`."""
+    """The file with the texts KEY=VALUE merged into its [flight]; their paths start at the working folder.
+
+    Raises `SettingsError`.
+    """
     document = deepcopy(dict(file.document))
     merged = dict(file.overrides)
     wrong = []
@@ -136,7 +140,13 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
             wrong.append(f"--set {shortened(override)}: must be KEY=VALUE, as in law.gains=paper_1")
             continue
         try:
-            key = put(document, name, value_of(value))
+            given = value_of(value)
+            key = put(document, name, given)
+            put(
+                document,
+                name,
+                [_absolute(key, one) for one in given] if isinstance(given, list) else _absolute(key, given),
+            )
         except SettingsError as error:
             wrong.append(f"--set {shortened(override)}: {error}")
             continue
@@ -197,18 +207,23 @@ def _described(document: Mapping[str, object], folder: Path) -> Checked:
     given = document.get("flight")
     schema = table.settings["flight"].table
     if isinstance(given, Mapping) and schema is not None:
-        document = {**document, "flight": at_own_speed(_with_airframe(given, folder), schema)}
-    flight, mistakes = check(table, document)
-    if isinstance(flight, Flight) and flight.target.track is not None:
-        track = str(folder.absolute() / file_name(flight.target.track))
-        flight = replace(flight, target=replace(flight.target, track=track))
-    return Checked(flight, mistakes)
+        document = {**document, "flight": at_own_speed(_with_paths(given, folder), schema)}
+    return check(table, document)
 
 
-def _with_airframe(flight: Mapping[str, object], folder: Path) -> Mapping[str, object]:
-    """A [flight] table whose airframe, if that is a folder beside the file, is named by its whole path."""
-    name = flight.get("aircraft")
-    if not isinstance(name, str) or not name or name in aircraft.names():
-        return flight
-    beside_file = str(folder.absolute() / file_name(name))
-    return {**flight, "aircraft": beside_file} if aircraft.is_folder(beside_file) else flight
+def _with_paths(flight: Mapping[str, object], folder: Path) -> Mapping[str, object]:
+    """A [flight] table whose paths are absolute."""
+    flight = {key: _absolute(("flight", key), value, folder) for key, value in flight.items()}
+    if isinstance(target := flight.get("target"), Mapping):
+        flight["target"] = {k: _absolute(("flight", "target", k), value, folder) for k, value in target.items()}
+    return flight
+
+
+def _absolute(key: Key, value: object, folder: Path = Path()) -> object:
+    """The value of a key; the name of a track, or of an airframe that is a folder there, as a path from `folder`."""
+    if not isinstance(value, str) or not value:
+        return value
+    path = str(folder.absolute() / file_name(value))
+    if key == ("flight", "aircraft") and value not in aircraft.names() and aircraft.is_folder(path):
+        return path
+    return path if key == ("flight", "target", "track") else value
