@@ -8,6 +8,7 @@ import aircraft
 from harness.error import did_you_mean
 from harness.flight import Flight, plant_of
 from harness.plants.plant import PlantError
+from harness.toml_text import shown
 from harness.world.air import Air
 from harness.world.target import Target
 from harness.world.track import TrackError, load_track
@@ -95,7 +96,7 @@ def airframe_of(name: str) -> Path:
             raise ValueError(must) from None
         known = aircraft.names()
         allowed = f"must be one of {', '.join(known)}, or a folder"
-        raise ValueError(f"is {name[:60]!r}, {allowed}{did_you_mean(name, known)}") from None
+        raise ValueError(f"is {shown(name)}, {allowed}{did_you_mean(name, known)}") from None
     aircraft.limits(airframe)
     return airframe
 

@@ -1,6 +1,7 @@
 """TOML that a user gives: a text as tables, a value of the command line, and a value as messages show it."""
 
 import json
+import os
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 DEEPEST = 30  # tables and lists within one another; what the harness reads has five
 _TOO_DEEP = f"it has more than {DEEPEST} tables or lists within one another"
 _LONGEST = 60  # characters of a text in a message
+_LONGEST_PATH = 4096  # the system knows no longer one
 
 
 def tables_of(text: str) -> dict[str, Any]:
@@ -39,9 +41,10 @@ def shown(value: object) -> str:
 
 
 def shortened(text: str) -> str:
-    """The text on one line, its beginning where it is long."""
+    """The text on one line, its beginning where it is long; a path is kept whole."""
     line = " ".join(text.split())
-    return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..."
+    most = _LONGEST_PATH if os.sep in line else _LONGEST
+    return line if len(line) <= most else f"{line[: most - 3]}..."
 
 
 def _values(table: Any) -> Any:

@@ -209,6 +209,12 @@ def test_every_command_says_what_it_does_and_prints_and_shows_an_example(name: s
     assert re.search(r"\b[Pp]rints?\b", text)
 
 
+def test_the_help_groups_its_commands() -> None:
+    _, *groups = re.split(r"^(?=\S.*:$)", invoke("--help").stdout.partition("Options:")[2], flags=re.MULTILINE)
+    told = {group.splitlines()[0]: re.findall(r"^  (\w+)", group, flags=re.MULTILINE) for group in groups}
+    assert told == {f"{heading}:": list(entries) for heading, entries in COMMANDS.items()}
+
+
 def test_a_commands_help_imports_that_command_alone() -> None:
     code = (
         "import sys\n"
@@ -307,3 +313,16 @@ def test_the_experiment_to_start_from_checks_and_runs_as_it_is_and_with_all_that
     assert "exclude" in everything
     again = invoke("init", file)
     assert (again.exit_code, again.stderr) == (2, f"{file}: exists already; choose another name\n")
+
+
+def test_a_long_path_is_never_cut(file: Path, tmp_path: Path) -> None:
+    deep = tmp_path.joinpath(*["a_folder_with_a_long_name"] * 6)
+    deep.mkdir(parents=True)
+    for setting, path in (("aircraft", deep / "plane"), ("target.track", deep / "track.csv")):
+        told = invoke("check", file, "--set", f"{setting}={path}").stderr
+        assert told.startswith(f"--set {setting}={path}: flight.{setting}: ")
+        assert told.count(str(path)) == 2  # what was typed, and in the message
+    out = deep / "out"
+    run = invoke("run", file, "--out", out, "--set", "seed=[1,2]", "--workers", "0", "--log", "none").stdout
+    assert f"results in {out}\nnext: harness show {out}, " in run
+    assert invoke("check", deep / "none.toml").stderr == f"{deep / 'none.toml'}: No such file or directory\n"
