@@ -8,19 +8,19 @@ import pandas as pd
 from harness.error import did_you_mean
 from harness.log.metric import METRICS
 from harness.margins import Assess
-from harness.runs.comparable import flights_and_margins
+from harness.runs.comparable import Comparable, comparable
 from harness.runs.results import as_results
-from harness.runs.store import last_run
+from harness.settings.columns import DIRECTORY
 from harness.toml_text import shown
 from harness.verdict.comparison import Comparison, compare_flights
-from harness.verdict.pairs import CompareError, settings_of
+from harness.verdict.pairs import CompareError, settings_of, usual
 
 _NEEDED = ("key", "outcome", "plant", "aircraft", "seed", "duration_s", "law.name", "law.standoff_m", *METRICS)
 
 
 def compare(
-    results: str | Path | pd.DataFrame,
-    by: str = "plant",
+    results: str | Path | pd.DataFrame | Sequence[str | Path],
+    by: str | None = None,
     baseline: object = None,
     where: Mapping[str, object] | None = None,
     *,
@@ -28,8 +28,10 @@ def compare(
 ) -> Comparison:
     """Pairs the flights that differ in the setting `by` alone, and says how their metrics differ.
 
-    - `results`: a directory of `run`, or a DataFrame as `load_results` or `pd.read_parquet` gives it.
-    - `by`: the setting, a column of the results; single gains change with a law or its set, nothing else does.
+    - `results`: a directory of `run`, several of them, or a DataFrame as `load_results` or `pd.read_parquet` gives it.
+    - `by`: the setting, a column of the results; single gains change with a law or its set, nothing else does. None is
+      the plant where several were flown, else the law or the first setting that varies; of several directories it is
+      "directory": the same settings flown by other code or libraries, or with other settings throughout.
     - `baseline`: its value that the others are compared with; None is the kinematic plant, or the first value.
     - `where`: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
     - `assess`: the margins of the verdict; None: those that the run's settings say, of a DataFrame the defaults.
@@ -39,22 +41,25 @@ def compare(
     >>> comparison = harness.compare("out/wind", where={"aircraft": "aerosonde"})
     >>> print(comparison.answer)
     >>> comparison.differences.query("metric == 'range_error_rms_m'")
+    >>> harness.compare(["out/before", "out/after"]).answer
     """
     if isinstance(results, pd.DataFrame):
-        flights, margins, question = _checked(results), Assess(), ""
+        given = Comparable(_checked(results), Assess(), "")
     else:
-        flights, margins = flights_and_margins(Path(results))
-        question = str(last_run(Path(results))["question"] or "")
-    return compare_chosen(flights, assess or margins, by, baseline, where or {}, question)
+        folders = [Path(results)] if isinstance(results, str | Path) else list(map(Path, results))
+        by = by or (DIRECTORY if len(folders) > 1 else None)
+        given = comparable(folders, by)
+    return compare_chosen(given if assess is None else given._replace(assess=assess), by, baseline, where or {})
 
 
-def compare_chosen(
-    flights: pd.DataFrame, assess: Assess, by: str, baseline: object, where: Mapping[str, object], question: str
-) -> Comparison:
+def compare_chosen(given: Comparable, by: str | None, baseline: object, where: Mapping[str, object]) -> Comparison:
     """The flights with these settings compared. Raises `CompareError` with what is missing or unknown."""
-    if by not in settings_of(flights):
-        raise CompareError(_unknown("by", by, settings_of(flights)))
-    return compare_flights(chosen(flights, where), assess, by, baseline, question)
+    flights = chosen(given.flights, where)
+    by = by or usual(flights)
+    known = [*([DIRECTORY] if DIRECTORY in flights else []), *settings_of(flights)]
+    if by not in known:
+        raise CompareError(_unknown("by", by, known))
+    return compare_flights(flights, given.assess, by, baseline, given.question, given.changed)
 
 
 def _checked(results: pd.DataFrame) -> pd.DataFrame:

@@ -41,16 +41,26 @@ def test_every_combination_has_its_counts_and_its_flights(comparison: Comparison
     assert sorted(key for each in found for key in each.keys) == sorted(comparison.table["key"])
 
 
+def test_a_map_holds_the_compared_setting_where_that_is_numeric() -> None:
+    flights = result_matrix(GAINS)
+    flights["range_error_rms_m"] = flights["law.k2"] * flights["law.k3"]
+    comparison = compare_flights(flights[flights["plant"] == "sixdof"].reset_index(drop=True), Assess(), "law.k2")
+    (found,) = grid.answering(comparison)
+    assert (found.metric, found.rows[0], found.columns[0]) == ("range_error_rms_m", "law.k2", "law.k3")
+    assert len(found.cells) == 6
+
+
 def test_the_answer_begins_with_what_was_flown(comparison: Comparison) -> None:
     text = "\n".join(lines(comparison))
-    told = f"In a limit cycle, of the flights in which it can be told: kinematic 0 of {6 * SEEDS}, sixdof {2 * SEEDS}"
+    quiet = f"{6 * SEEDS} of {6 * SEEDS} with plant = kinematic, {4 * SEEDS - 1} of {6 * SEEDS - 1} with plant = sixdof"
+    told = f"No limit cycle, of the flights in which it can be told, in {quiet}."
     assert told in text
     assert text.index(told) < text.index("settled\n") < text.index("beside kinematic, 72 pairs, 12 seeds, ended early")
 
 
 def test_a_map_holds_the_median_of_each_cell_and_leads_to_its_flights(comparison: Comparison) -> None:
     first, second = grid.grids(comparison, "range_error_rms_m")
-    assert (first.value, second.value) == ("kinematic", "sixdof")
+    assert [each.at["plant"] for each in (first, second)] == ["kinematic", "sixdof"]
     assert second.rows == ("law.k2", [1.0, 4.0, 12.0])
     assert second.columns == ("law.k3", [0.5, 6.0])
     for (k2, k3), cell in second.cells.items():

@@ -20,10 +20,10 @@ import pytest
 
 import harness
 from harness.log.metric import METRICS, YES_OR_NO
-from harness.runs.comparable import flights_and_margins
+from harness.runs.comparable import comparable
 from harness.runs.description import description
 from harness.runs.matrix import read_matrix
-from harness.runs.results import PARQUET, export, mixed_versions
+from harness.runs.results import PARQUET, export, versions
 from harness.runs.store import JOURNAL, find, reading
 from harness.settings import read_settings
 from harness.verdict.pairs import settings_of
@@ -168,8 +168,7 @@ def test_a_file_is_read_once_so_that_a_pipe_keeps_its_margins(tmp_path: Path) ->
     run_it = words_of("run", "/dev/stdin", "--out", out, "--workers", 0, "--limit", 1, "--log", "none")
     done = subprocess.run(run_it, input=text, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    _, margins = flights_and_margins(out)
-    assert margins.range_error_margin == 100.0
+    assert comparable([out]).assess.range_error_margin == 100.0
 
 
 def test_a_file_in_the_place_of_the_directory_is_told_and_left(file: Path) -> None:
@@ -332,19 +331,19 @@ def test_an_edited_law_inner_loop_airframe_or_track_is_a_new_flight_and_a_mix_is
         (own_copy / "aircraft" / "ultra_stick_25e" / "ultra_stick_25e.xml", "<!-- another airframe -->\n", 1),
         (track, "5,9,0\n", 2),
     ]
-    assert mixed_versions(out) == []
+    assert {len(counts) for counts in versions(out).values()} == {1}
     for path, text, new in edits:
         append(path, text)
         assert in_copy(own_copy, *run_it).startswith(f"{new} flown, {2 - new} earlier"), path
         assert in_copy(own_copy, *run_it).startswith("0 flown, 2 earlier"), path
-    told = mixed_versions(out)
-    assert [line.split(" has ")[0] for line in told] == [
+    mixed = {what: counts for what, counts in versions(out).items() if len(counts) > 1}
+    assert list(mixed) == [
         "autopilot/smc.py",
         f"the track {track}",
         "autopilot/inner_loop.xml",
         "aircraft/model of ultra_stick_25e",
     ]
-    assert told[0].endswith("has 2 versions, of 2 and 6 flights")
+    assert list(mixed["autopilot/smc.py"].values()) == [2, 6]
     refused = command("compare", out)
     assert refused.returncode == 2
     (line,) = refused.stderr.splitlines()

@@ -13,34 +13,35 @@ if TYPE_CHECKING:
 
 
 def read_comparison(
-    folder: Path,
+    folders: tuple[Path, ...],
     overrides: tuple[str, ...] = (),
-    by: str = "plant",
+    by: str | None = None,
     baseline: str | None = None,
     where: tuple[str, ...] = (),
 ) -> tuple[Comparison, Origin]:
-    """The comparison of a run's directory. BadInput when it holds none, with what is missing."""
+    """The comparison of directories of runs. BadInput when it holds none, with what is missing."""
     from harness.comparison import compare_chosen
     from harness.error import SettingsError
-    from harness.runs.comparable import flights_and_margins
+    from harness.runs.comparable import comparable
     from harness.runs.store import StoreError, last_run
+    from harness.settings.columns import DIRECTORY
     from harness.verdict.pairs import CompareError
     from harness.verdict.report import origin_of
 
     for override in overrides:
         if not override.strip().startswith("assess."):
             raise BadInput(f"--set {override}: only margins can be set here, as in assess.sideslip_deg=3")
+    place = " and ".join(map(str, folders))
+    by = by or (DIRECTORY if len(folders) > 1 else None)
     try:
-        flights, assess = flights_and_margins(folder, overrides)
-        run = last_run(folder)
-        question = str(run["question"] or "")
-        comparison = compare_chosen(flights, assess, by, _value(baseline), wanted(where), question)
-        return comparison, origin_of(str(folder), run)
+        given = comparable(folders, by, overrides)
+        comparison = compare_chosen(given, by, _value(baseline), wanted(where))
+        return comparison, origin_of(tuple(map(str, folders)), [last_run(folder) for folder in folders])
     except SettingsError as error:
         raise BadInput(str(error)) from None
     except (StoreError, CompareError) as error:
         text = str(error)
-        raise BadInput(text if text.startswith(str(folder)) else f"{folder}: {text}") from None
+        raise BadInput(text if text.startswith(str(folders[0])) else f"{place}: {text}") from None
 
 
 def wanted(where: tuple[str, ...]) -> dict[str, object]:

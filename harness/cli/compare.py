@@ -1,4 +1,4 @@
-"""`harness compare`: what differs between the plants."""
+"""`harness compare`: what differs between plants, laws, any setting, or runs."""
 
 from pathlib import Path
 
@@ -8,8 +8,8 @@ from harness.cli._paths import PATH
 
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=PATH)
-@click.option("--by", default="plant", show_default=True, metavar="KEY", help="The setting whose values are compared.")
+@click.argument("directories", metavar="DIR...", nargs=-1, required=True, type=PATH)
+@click.option("--by", metavar="KEY", help="The setting whose values are compared.  [default: plant, if several]")
 @click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
 @click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
 @click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
@@ -18,8 +18,8 @@ from harness.cli._paths import PATH
 @click.option("--csv", "form", flag_value="csv", help="Print the paired differences as CSV.")
 @click.option("--latex", "form", flag_value="latex", help="Print the paired differences as a LaTeX tabular.")
 def compare(
-    directory: Path,
-    by: str,
+    directories: tuple[Path, ...],
+    by: str | None,
     baseline: str | None,
     where: tuple[str, ...],
     overrides: tuple[str, ...],
@@ -28,10 +28,12 @@ def compare(
 ) -> None:
     """Compare the flights of a run that differ in one setting alone.
 
-    DIR is a folder that `harness run` wrote; the setting is the plant unless --by names another. Prints how the
-    flights of each combination of settings ended, a map where two numeric settings vary, and for each airframe which
-    part of the coordinated-flight assumption holds within its margin, or which metrics differ, with 95 % intervals.
-    The margins are the table [assess] of the experiment's file, see `harness list margins`.
+    DIR is a folder that `harness run` wrote. The setting is the plant where several were flown, else the law or the
+    first that varies; --by names another. Of two or more folders, the same flights in each are compared: what other
+    code or other settings moved, by how much, and which flights. Prints how the flights of each combination ended, a
+    map where two numeric settings vary, and for each airframe which part of the coordinated-flight assumption holds
+    within its margin, or which metrics differ, with 95 % intervals. The margins are the table [assess] of the
+    experiment's file, see `harness list margins`.
 
     \b
     Examples:
@@ -39,6 +41,7 @@ def compare(
       harness compare out/wind --json --set assess.range_error_margin_m=1
       harness compare out/gains --map range_error_rms_m
       harness compare out/laws --by law.name --baseline smc --where plant=sixdof
+      harness compare out/before out/after
     """
     import json
 
@@ -50,7 +53,7 @@ def compare(
     from harness.verdict.text import lines
 
     with busy("comparing"):
-        comparison, _ = read_comparison(directory, overrides, by, baseline, where)
+        comparison, _ = read_comparison(directories, overrides, by, baseline, where)
     match form:
         case "json":
             click.echo(json.dumps(as_document(comparison), allow_nan=False))
@@ -62,6 +65,6 @@ def compare(
             try:
                 text = list(lines(comparison, mapped))
             except CompareError as error:
-                raise BadInput(f"{directory}: {error}") from None
+                raise BadInput(f"{' and '.join(map(str, directories))}: {error}") from None
             for line in text:
                 click.echo(line)

@@ -43,7 +43,7 @@ def demo(out: Path) -> None:
     except (StoreError, WorkersError) as error:
         raise BadInput(str(error)) from None
     click.echo()
-    comparison, _ = read_comparison(out)
+    comparison, _ = read_comparison((out,))
     click.echo(comparison.answer)
     key = comparison.pairs.other["key"].iloc[0][:8]
     click.echo(

@@ -74,7 +74,7 @@ def _map(folder: Path, metric: str, where: tuple[str, ...]) -> tuple[Picture, st
     from harness.cli._input import BadInput
     from harness.comparison import chosen
     from harness.drawing import COLUMN, PAGE, picture
-    from harness.runs.comparable import flights_and_margins
+    from harness.runs.comparable import comparable
     from harness.runs.store import StoreError
     from harness.settings import SettingsError
     from harness.verdict import figures, grid
@@ -84,7 +84,7 @@ def _map(folder: Path, metric: str, where: tuple[str, ...]) -> tuple[Picture, st
     if not folder.is_dir():
         raise BadInput(f"{folder}: must be a folder that `harness run` wrote")
     try:
-        flights, assess = flights_and_margins(folder)
+        flights, assess, *_ = comparable([folder])
         table = entered(with_following(chosen(flights, wanted(where))), assess.circling_error)
         varies = axes(spread(table))
         grids = grid.maps(table, varies, metric)

@@ -1,33 +1,84 @@
-"""The flights of a run that may be compared, and the margins that judge them."""
+"""The flights of one run, or of several, that may be compared, and the margins that judge them."""
 
 import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from harness.margins import Assess
-from harness.runs.results import load_results, mixed_versions
+from harness.runs.results import load_results, versions
 from harness.runs.store import StoreError, last_run
 from harness.settings import settings_from_text
+from harness.settings.columns import DIRECTORY
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def flights_and_margins(folder: Path, overrides: Sequence[str] = ()) -> "tuple[pd.DataFrame, Assess]":
-    """The flights of a run, and the margins that its settings and command line say; `overrides`: assess.KEY=VALUE.
+class Comparable(NamedTuple):
+    """What a comparison starts from."""
 
-    Raises `SettingsError`; `StoreError` without results, or when the flights are of different versions.
+    flights: "pd.DataFrame"
+    assess: Assess  # of the first directory
+    question: str  # of the first directory
+    changed: tuple[str, ...] = ()  # what the versions of the directories differ in
+
+
+def comparable(folders: Sequence[Path], by: str | None = None, overrides: Sequence[str] = ()) -> Comparable:
+    """The flights of these directories; `overrides`: assess.KEY=VALUE.
+
+    With `by` = `DIRECTORY` a flight may be in each of them, and their versions may differ. Raises `SettingsError`;
+    `StoreError` without results, or when flights of different versions would be mixed.
     """
+    import pandas as pd
+
+    question, assess = _asked(folders[0], overrides)
+    if len(folders) == 1:
+        _refuse_mixed(versions(folders[0]), str(folders[0]))
+        return Comparable(load_results(folders[0]), assess, question)
+    names = list(map(str, folders))
+    if len(set(names)) < len(names):
+        raise StoreError(f"{names[0]}: is named twice")
+    flights = pd.concat(
+        [load_results(folder).assign(**{DIRECTORY: name}) for folder, name in zip(folders, names, strict=True)],
+        ignore_index=True,
+    )
+    known = [versions(folder) for folder in folders]
+    if by == DIRECTORY:
+        for of, name in zip(known, names, strict=True):
+            _refuse_mixed(of, name)
+        every = dict.fromkeys(what for of in known for what in of)
+        changed = tuple(what for what in every if len({tuple(of.get(what, ())) for of in known}) > 1)
+        return Comparable(flights, assess, question, changed)
+    pooled: dict[str, dict[str, int]] = {}
+    for of in known:
+        for what, counts in of.items():
+            for which, count in counts.items():
+                pooled.setdefault(what, {}).setdefault(which, 0)
+                pooled[what][which] += count
+    _refuse_mixed(pooled, " and ".join(names))
+    return Comparable(flights.drop_duplicates("key").reset_index(drop=True), assess, question)
+
+
+def _asked(folder: Path, overrides: Sequence[str]) -> tuple[str, Assess]:
+    """The question and the margins that the settings and the command line of the last run say."""
     of = last_run(folder)
     where = Path(f"{folder} (its copy of {of['file']})")
     assess = settings_from_text(of["settings"], where, [*_given(of["command"]), *overrides]).assess()
-    if mixed := mixed_versions(folder):
+    return str(of["question"] or ""), assess
+
+
+def _refuse_mixed(of: dict[str, dict[str, int]], place: str) -> None:
+    mixed = [
+        f"{what} has {len(counts)} versions, of {' and '.join(map(str, counts.values()))} flights"
+        for what, counts in of.items()
+        if len(counts) > 1
+    ]
+    if mixed:
         raise StoreError(
-            f"{folder}: its flights are of different versions, which a comparison must not mix: {'; '.join(mixed)}. "
+            f"{place}: its flights are of different versions, which a comparison must not mix: {'; '.join(mixed)}. "
             "Fly them again into another directory"
         )
-    return load_results(folder), assess
 
 
 def _given(command: str) -> Iterator[str]:

@@ -26,7 +26,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     """The flights of a run's directory, one row each, in the order of the matrix; also while it is written.
 
     Columns: key, outcome, reason, digest, feasibility_margin_deg_s, seconds (wall time of the flight), run and version
-    (what decided it beside its settings: see `mixed_versions`); every setting by its dotted key below [flight] in file
+    (what decided it beside its settings: see `versions`); every setting by its dotted key below [flight] in file
     units (lists are tuples, a list of tables is JSON text); every metric by its name, NaN for none (of one that is true
     or false: nullable `boolean`). In the Parquet file the metadata of a column says what it is: `kind` is setting,
     metric or result, and a metric has its `unit` and `meaning`.
@@ -153,10 +153,10 @@ def as_results(table: "pd.DataFrame") -> "pd.DataFrame":
     return table.assign(**{str(name): column for name, column in typed.items()})
 
 
-def mixed_versions(folder: Path) -> list[str]:
-    """Sentences on rows of this directory that a comparison would mix although they differ in version.
+def versions(folder: Path) -> dict[str, dict[str, int]]:
+    """What decided the flights of this directory beside their settings: name -> version -> how many flights.
 
-    Rows can be compared when law file, inner loop, airframe, target track, physics and libraries are the same.
+    That is law files, inner loop, airframes, target tracks, physics, metrics and libraries.
     """
     counts: dict[str, dict[str, int]] = {}
     with reading(folder) as journal:
@@ -175,8 +175,4 @@ def mixed_versions(folder: Path) -> list[str]:
                 what = f"the track {track}"
             of = counts.setdefault(what, {})
             of[str(which)] = of.get(str(which), 0) + count
-    return [
-        f"{what} has {len(of)} versions, of {' and '.join(map(str, of.values()))} flights"
-        for what, of in counts.items()
-        if len(of) > 1
-    ]
+    return counts

@@ -14,7 +14,7 @@ import click
 
 from harness.files import replacing, write_text
 from harness.margins import Assess
-from harness.runs.comparable import flights_and_margins
+from harness.runs.comparable import comparable
 from harness.studies.command import out_option, run, write
 from harness.template import template
 from harness.verdict.answer import interval, plain, signed, unit_of
@@ -369,8 +369,8 @@ def _folder() -> click.Path:
 @out_option
 def main(directory: Path, gains: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
     """Write OUT/does_it_hold.md from the flights of experiments/assumption.toml and quiet_gains.toml."""
-    flights, assess = flights_and_margins(directory)
-    of_gains, _ = flights_and_margins(gains)
+    flights, assess, *_ = comparable([directory])
+    of_gains = comparable([gains]).flights
     text, block = page(flights, of_gains, assess, (str(directory), str(gains)))
     write(out, {"does_it_hold.md": text})
     if readme is not None:

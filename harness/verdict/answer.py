@@ -1,10 +1,13 @@
 """A comparison in sentences: each with its condition, its numbers and how many pairs and seeds it rests on."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.tables import number, table
+from harness.verdict import flown, moved
 from harness.verdict.comparison import Comparison, Scorecard
 from harness.verdict.conditions import Conclusion
 from harness.verdict.judgement import HIGHER, LOWER, Judgement
@@ -12,6 +15,9 @@ from harness.verdict.pairs import UNDISTURBED, shown
 from harness.verdict.parts import PARTS, Group, Part
 from harness.verdict.statistics import Share
 from harness.vocabulary import Verdict
+
+ALIKE = "alike"  # a difference that is shown to lie within its margin
+CHANGE_HEADINGS = ("metric", "in cells", "largest difference", "margin", "where")
 
 
 def sentences(comparison: Comparison) -> Iterator[str]:
@@ -42,7 +48,7 @@ def scorecard(card: Scorecard, comparison: Comparison) -> Iterator[str]:
         f"{counted(card.pairs, 'pair')}, {counted(card.seeds, 'seed')}{lost_flights}"
     )
     if not comparison.assumption:
-        yield from (f"  {line}" for line in changes(card))
+        yield from (f"  {line}" for line in table(list(CHANGE_HEADINGS), changes(card)))
         return
     headings = ["part", "verdict", "worst cell, 95 % interval", "asked", "where"]
     rows: list[tuple[str, ...]] = []
@@ -111,6 +117,7 @@ def compared(comparison: Comparison) -> Iterator[str]:
         f"{counted(len(comparison.pairs), 'pair')}, {counted(seeds, 'seed')}, from "
         f"{counted(comparison.flights, 'flight')}; varies: {varies or 'nothing else'}."
     )
+    yield from moved.sentences(comparison)
     yield from _lost(comparison)
     margin = comparison.pairs.other["feasibility_margin_deg_s"]
     outrun, infeasible = int((margin == -math.inf).sum()), int(((margin < 0.0) & (margin > -math.inf)).sum())
@@ -128,6 +135,7 @@ def compared(comparison: Comparison) -> Iterator[str]:
             f"In {counted(astray, 'pair')} the flight of {comparison.baseline} does not circle its target: "
             "such pairs do not count in what circling costs."
         )
+    yield from flown.quiet(comparison)
     if comparison.unpaired:
         yield f"{counted(len(comparison.unpaired), 'flight')} could not be compared."
 
@@ -166,30 +174,44 @@ def worded(conclusion: Conclusion) -> str:
     return text
 
 
-def changes(card: Scorecard) -> Iterator[str]:
-    """One line per metric that is lower or higher anywhere, and the parts that have a margin."""
+class ChangeLine(NamedTuple):
+    """What a comparison says of one metric, all in words."""
+
+    metric: str
+    found: str  # lower, higher, alike or undecided, in how many cells
+    largest: str  # difference, with its interval
+    margin: str
+    where: str  # the largest difference is
+
+
+def changes(card: Scorecard) -> Iterator[ChangeLine]:
+    """The metrics with a margin, and those that are lower or higher anywhere."""
     for column in dict.fromkeys(judgement.column for judgement in card.judgements):
         judgements = card.of(column)
+        counts = Counter(map(_direction, judgements))
         if judgements[0].has_margin:
-            part = PARTS[column]
-            of = worst(card, part)
-            where = f", at {place(of.at)}" if place(of.at) and len(judgements) > 1 else ""
-            differing = sum(j.word == Verdict.FAILS for j in judgements)
-            same = sum(j.word == Verdict.HOLDS for j in judgements)
-            margin = bound(of, part).removeprefix("within ")
-            yield (
-                f"{part.title}: differs by more than its margin in {differing}, by less in {same} of "
-                f"{counted(len(judgements), 'cell')} ({value(of)}, margin {margin}{where})."
-            )
-            continue
-        higher, lower = (sum(j.word == word for j in judgements) for word in (HIGHER, LOWER))
-        if higher or lower:
-            largest = max((j for j in judgements if j.word in (HIGHER, LOWER)), key=lambda j: abs(j.difference))
-            where = f", at {place(largest.at)}" if place(largest.at) and len(judgements) > 1 else ""
-            counts = f"lower in {lower}, higher in {higher} of {counted(len(judgements), 'cell')}"
-            said = (HIGHER if higher else LOWER) if len(judgements) == 1 else counts
-            if plain(largest.difference) != "0":
-                yield f"{column}: {said} ({value(largest)}{where})."
+            of, title = worst(card, PARTS[column]), PARTS[column].title
+            margin = bound(of, PARTS[column]).removeprefix("within ")
+        else:
+            told = [j for j in judgements if j.word in (HIGHER, LOWER)]
+            if not told:
+                continue
+            of, title, margin = max(told, key=lambda j: abs(j.difference)), column, ""
+            if plain(of.difference) == "0":
+                continue
+        if len(judgements) == 1:
+            found = next(iter(counts))
+        else:
+            words = (f"{word} {counts[word]}" for word in (LOWER, HIGHER, ALIKE, Verdict.UNDECIDED) if counts[word])
+            found = f"{', '.join(words)} of {len(judgements)}"
+        yield ChangeLine(title, found, value(of), margin, place(of.at) if len(judgements) > 1 else "")
+
+
+def _direction(judgement: Judgement) -> str:
+    """Lower or higher, by more than the margin where there is one; alike where it is shown to lie within."""
+    if judgement.word == Verdict.FAILS:
+        return LOWER if judgement.difference < 0.0 else HIGHER
+    return ALIKE if judgement.word == Verdict.HOLDS else judgement.word
 
 
 def place(at: Mapping[str, object]) -> str:

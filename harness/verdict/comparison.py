@@ -90,6 +90,7 @@ class Comparison:
     scorecards: tuple[Scorecard, ...]
     table: pd.DataFrame = field(repr=False)  # the flights as they entered
     question: str = ""  # of the experiment
+    changed: tuple[str, ...] = ()  # beside the settings, where directories are compared: files, physics, libraries
 
     @property
     def assumption(self) -> bool:
@@ -159,6 +160,7 @@ def compare_flights(
     by: str = "plant",
     baseline: object = None,
     question: str = "",
+    changed: tuple[str, ...] = (),
 ) -> Comparison:
     """Flights of a table as `load_results` gives it, those that differ in `by` alone, paired.
 
@@ -169,7 +171,7 @@ def compare_flights(
         values = ordered(flights[by])
         baseline = BASELINE if by == "plant" else values[0]
     assumption = by == "plant" and shown(baseline) == BASELINE
-    table = with_shares(entered(with_following(flights) if assumption else flights, assess.circling_error))
+    table = with_shares(entered(with_following(flights), assess.circling_error))
     paired = pairs_by(table, by, baseline)
     failed = table["outcome"].isin(FAILED)
     return Comparison(
@@ -182,6 +184,7 @@ def compare_flights(
         tuple(_scorecards(paired, by, assess, assumption=assumption)),
         table,
         question,
+        changed,
     )
 
 

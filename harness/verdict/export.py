@@ -11,6 +11,7 @@ from harness.markup import latex
 from harness.settings.written import written
 from harness.verdict.answer import signed, unit_of
 from harness.verdict.comparison import Comparison
+from harness.verdict.moved import moved
 
 
 def as_document(comparison: Comparison) -> dict[str, Any]:
@@ -24,6 +25,8 @@ def as_document(comparison: Comparison) -> dict[str, Any]:
             {"baseline": before, "key": after}
             for before, after in zip(comparison.pairs.reference["key"], comparison.pairs.other["key"], strict=True)
         ],
+        "changed": list(comparison.changed),
+        "moved": [flight._asdict() for flight in moved(comparison)],
         "unpaired": [asdict(flight) for flight in comparison.unpaired],
         "assess": written(comparison.assess),
         "axes": comparison.axes,

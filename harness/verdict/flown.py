@@ -12,6 +12,7 @@ from harness.verdict.pairs import joined, ordered, shown, spread
 
 TOLD = ("convergence_time_s", "range_error_rms_m", "saturation_fraction", "sideslip_rms_deg")  # beside the counts
 MOST_LINES = 24
+MOST_VALUES = 4  # told one by one
 
 
 class Shares(NamedTuple):
@@ -82,9 +83,17 @@ def lines(comparison: Comparison) -> Iterator[str]:
         yield f"... and {more} more: choose with --where KEY=VALUE, or see the page of `harness report`"
 
 
-def cycling(comparison: Comparison) -> str:
-    """In how many flights of each value of what is compared a limit cycle shows."""
+def quiet(comparison: Comparison) -> Iterator[str]:
+    """In how many flights of each value of what is compared no limit cycle shows."""
     flights = comparison.table
-    shares = ((value, _cycling(flights[flights[comparison.by] == value])) for value in ordered(flights[comparison.by]))
-    told = ", ".join(f"{shown(value)} {share}" for value, share in shares if share.of)
-    return f"In a limit cycle, of the flights in which it can be told: {told}." if told else ""
+    values = ordered(flights[comparison.by])
+    if len(values) > MOST_VALUES:
+        cycling = [("", _cycling(flights))]
+    else:
+        cycling = [
+            (f" with {comparison.by} = {shown(value)}", _cycling(flights[flights[comparison.by] == value]))
+            for value in values
+        ]
+    told = [f"{of.of - of.number} of {of.of}{which}" for which, of in cycling if of.of]
+    if told:
+        yield f"No limit cycle, of the flights in which it can be told, in {', '.join(told)}."

@@ -38,7 +38,6 @@ class Grid:
     """One metric by two axes, of the flights that are alike in everything else."""
 
     metric: str
-    value: str  # of what is compared
     at: Mapping[str, object]  # what is the same in all cells, of what varies
     rows: tuple[str, Sequence[object]]  # axis and values
     columns: tuple[str, Sequence[object]]
@@ -77,14 +76,14 @@ def maps(
     if metric not in METRICS:
         hint = did_you_mean(metric, METRICS)
         raise CompareError(f"no metric has the name {metric!r}{hint}; see `harness list metrics`")
-    numeric = [axis for axis, values in axes.items() if is_ordered(values)]
-    numeric = sorted(numeric, key=lambda axis: -len(axes[axis]))[:2]
-    if len(numeric) < 2:
-        return []
-    first, second = (axis for axis in axes if axis in numeric)
     flights = spread(entered)
     flights = flights.assign(**{name: entered[name] for name in others if name not in flights})
-    fixed = [*(axis for axis in axes if axis not in numeric), *others]
+    values = {axis: ordered(flights[axis]) for axis in (*axes, *others)}
+    numeric = sorted((axis for axis in values if is_ordered(values[axis])), key=lambda axis: -len(values[axis]))[:2]
+    if len(numeric) < 2:
+        return []
+    first, second = sorted(numeric)
+    fixed = [axis for axis in values if axis not in numeric]
     found = []
     for at in product(*(ordered(flights[axis]) for axis in fixed)):
         there = pd.Series(True, index=flights.index)
@@ -93,10 +92,19 @@ def maps(
         cells = {(row, column): _cell(rows, metric) for (row, column), rows in flights[there].groupby([first, second])}
         if cells:
             rows, columns = ((axis, ordered(flights.loc[there, axis])) for axis in (first, second))
-            found.append(
-                Grid(metric, shown(at[-1]) if at else "", dict(zip(fixed, at, strict=True)), rows, columns, cells)
-            )
+            found.append(Grid(metric, dict(zip(fixed, at, strict=True)), rows, columns, cells))
     return found
+
+
+def answering(comparison: Comparison) -> list[Grid]:
+    """The maps at the value furthest from the baseline; none of limit cycles where none shows."""
+    return [
+        each
+        for metric in DEFAULT
+        for each in grids(comparison, metric)
+        if comparison.by not in each.at or shown(each.at[comparison.by]) == comparison.values[-1]
+        if any(cell.value > 0.0 for cell in each.cells.values())
+    ]
 
 
 def _cell(rows: pd.DataFrame, metric: str) -> GridCell:

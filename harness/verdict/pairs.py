@@ -13,7 +13,7 @@ from harness.error import HarnessError
 from harness.log.metric import METRICS
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
-from harness.settings.columns import is_setting
+from harness.settings.columns import DIRECTORY, is_setting
 from harness.world.wind import SEVERITIES
 
 Array = NDArray[np.float64]
@@ -132,8 +132,26 @@ def pairs_by(flights: pd.DataFrame, key: str, baseline: object) -> Pairs:
     return paired
 
 
+def usual(flights: pd.DataFrame) -> str:
+    """The setting whose values are compared where none is named: plant, law, or the first that was set to several."""
+    several = axes(spread(flights))
+    if "plant" in several or not several:
+        return "plant"
+    if "law" in several:
+        return "law.name" if flights["law.name"].nunique() > 1 else "law.gains"
+    first = next((axis for axis in several if axis != "aircraft"), "aircraft")
+    return {"wind_speed_mps": "wind.steady_mps"}.get(first, first)
+
+
 def bundle(flights: pd.DataFrame, key: str) -> list[str]:
-    """The settings that change with this one: single gains with a law or its set, nothing with anything else."""
+    """The settings that change with this one: single gains with a law or its set, nothing with another setting.
+
+    With the directory: what is the same in all its flights, or in all of the same law.
+    """
+    if key == DIRECTORY:
+        law = [column for column in ("law.name", "law.gains") if column in flights]
+        of = flights[DIRECTORY].tolist(), joined(flights, [DIRECTORY, *law])
+        return [DIRECTORY, *(c for c in varying(flights) if c != "seed" and _follows(flights[c], of[c not in law]))]
     if key not in ("law.name", "law.gains"):
         return [key]
     own = ["law.name", "law.gains"] if key == "law.name" else ["law.gains"]
@@ -244,6 +262,8 @@ def _is_drawn(flights: pd.DataFrame) -> bool:
 def ordered(values: pd.Series) -> list[object]:
     """The different values in their order: of numbers, of severities, of plants up the ladder, else of words."""
     different = list(dict.fromkeys(values))
+    if values.name == DIRECTORY:
+        return different  # in the order in which they were named
     if is_ordered(different):
         return sorted(different, key=_rank)
     if all(value in PLANTS for value in different):

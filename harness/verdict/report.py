@@ -1,16 +1,17 @@
 """The report: a comparison as one self-contained page."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 from harness.drawing import draw
 from harness.log.metric import METRICS
+from harness.settings.columns import DIRECTORY
 from harness.settings.written import written
 from harness.tables import number
 from harness.template import template
-from harness.verdict import answer, figures, flown, grid
+from harness.verdict import answer, figures, flown, grid, moved
 from harness.verdict.comparison import Comparison, Scorecard
 from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
 from harness.verdict.pairs import shown, spread
@@ -29,11 +30,10 @@ MOST_DISTURBED = 200  # rows
 class Origin:
     """Where the flights come from: what heads the page."""
 
-    folder: str
+    folder: str  # or several, as a command names them
     title: str
     question: str
-    command: str  # that flew them
-    flown: str  # when, and with which code
+    runs: tuple[tuple[str, str], ...]  # of each: the command that flew it; when, and with which code
 
 
 class Drawing(NamedTuple):
@@ -65,10 +65,10 @@ def page(comparison: Comparison, origin: Origin) -> str:
         words=answer,
         groups=[group for group in Group if any(part.group is group for part in judged_parts)],
         parts=judged_parts,
-        cycling=flown.cycling(comparison),
         flown=flown.combinations(comparison),
         told=[METRICS[name] for name in flown.TOLD],
         number=number,
+        moved=moved.moved(comparison),
         most_lines=MOST_LINES,
         grids=[each for metric in grid.DEFAULT for each in grid.grids(comparison, metric)[::-1]][:MOST_GRIDS],
         folder=origin.folder,
@@ -148,8 +148,15 @@ def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
             ", ".join(f"{column} = {shown(named.loc[index, column])}" for column in [*columns, "seed"]),
             str(after["outcome"]),
             keys,
-            f"harness view {folder} --flight {keys[0]} --flight {keys[1]}",
+            _to_see(str(before.get(DIRECTORY, folder)), str(after.get(DIRECTORY, folder)), *keys),
         )
+
+
+def _to_see(before: str, after: str, first: str, second: str) -> str:
+    """What to type to see two flights."""
+    if before == after:
+        return f"harness view {before} --flight {first} --flight {second}"
+    return f"harness fly {after}:{second} --against {before}:{first}"
 
 
 def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
@@ -168,8 +175,14 @@ def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
     return chosen
 
 
-def origin_of(folder: str, run: Mapping[str, object]) -> Origin:
-    """From a run's provenance."""
+def origin_of(folders: Sequence[str], runs: Sequence[Mapping[str, object]]) -> Origin:
+    """From the provenance of each folder's run."""
+    title = " and ".join(str(run["title"] or folder) for folder, run in zip(folders, runs, strict=True))
+    if len(runs) > 1 and len({run["title"] for run in runs}) < len(runs):
+        title = " and ".join(folders)
+    return Origin(" ".join(folders), title, str(runs[0]["question"] or ""), tuple(map(_run, runs)))
+
+
+def _run(run: Mapping[str, object]) -> tuple[str, str]:
     commit = str(run["git_commit"] or "unknown")[:12] + (" with changes" if run["git_dirty"] else "")
-    flown = f"{run['started']}, commit {commit}, Python {run['python']}, {run['platform']}"
-    return Origin(folder, str(run["title"] or folder), str(run["question"] or ""), str(run["command"]), flown)
+    return str(run["command"]), f"{run['started']}, commit {commit}, Python {run['python']}, {run['platform']}"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from harness.verdict import flown, grid
+from harness.verdict import flown, grid, moved
 from harness.verdict.answer import answers, counted, missing_flights, opening, scorecard
 from harness.verdict.comparison import Comparison, Unpaired
 from harness.verdict.pairs import CompareError, shown
@@ -17,16 +17,26 @@ def lines(comparison: Comparison, mapped: str | None = None) -> Iterator[str]:
     if mapped is not None:
         yield from grid.lines(_maps(comparison, mapped))
         return
-    if told := flown.cycling(comparison):
-        yield told
-    yield ""
-    yield from flown.lines(comparison)
-    answering = [each for each in grid.grids(comparison, "chatters") if each.value == comparison.values[-1]]
-    yield from grid.lines(answering)
-    yield from answers(comparison)
-    for card in comparison.others:
+    maps = list(grid.lines(grid.answering(comparison)))
+    if len(flown.combinations(comparison)[1]) > flown.MOST_LINES and maps:
+        yield from maps
+        yield "A line for each combination: `harness show`, and the page of `harness report`."
+    else:
         yield ""
-        yield from scorecard(card, comparison)
+        yield from flown.lines(comparison)
+        yield from maps
+    yield from answers(comparison)
+    yield from moved.lines(comparison)
+    if comparison.assumption or len(comparison.values) <= flown.MOST_VALUES:
+        for card in comparison.others:
+            yield ""
+            yield from scorecard(card, comparison)
+    else:
+        yield ""
+        yield f"{comparison.by} = {', '.join(comparison.values[:-1])}: --csv and `harness report` tell each difference."
+    if not comparison.assumption:
+        yield ""
+        yield "Lower, higher: by more than the margin, where there is one; alike: shown to lie within it."
     options = list(dict.fromkeys(missing_flights(comparison)))
     if options:
         yield ""
