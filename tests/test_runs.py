@@ -25,6 +25,7 @@ from harness.runs.description import description
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, export, versions
 from harness.runs.store import JOURNAL, find, reading
+from harness.runs.workers import Task, WorkerResult
 from harness.settings import read_settings
 from harness.verdict.pairs import settings_of
 from tests.builders import (
@@ -161,6 +162,24 @@ def test_results_flown_before_a_metric_was_added_have_its_column_without_a_value
     assert results["added_m"].dtype == float
     assert results["is_added"].isna().all()
     assert results["is_added"].dtype == "boolean"
+
+
+def test_a_run_without_a_flight_yet_is_told_in_one_sentence(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+
+    def interrupted(task: Task, folder: Path) -> WorkerResult:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fly_matrix(file, out, options=replace(HERE, fly=interrupted))
+    for words in (("show",), ("show", "--csv"), ("compare",), ("report",), ("export", "--to", "csv")):
+        done = invoke(words[0], out, *words[1:])
+        assert done.exit_code == 2
+        assert done.stderr.startswith(
+            f"{out}: has no flight yet: its run ended before the first, or is at it; to go on: "
+        )
+        assert done.stderr.count("\n") == 1
+    assert fly_matrix(file, out).done == 10
 
 
 def test_a_file_is_read_once_so_that_a_pipe_keeps_its_margins(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.files import as_text, replacing
 from harness.log.metric import METRICS, YES_OR_NO
-from harness.runs.store import reading, state
+from harness.runs.store import StoreError, last_run, reading, state
 from harness.settings.columns import by_column, is_setting
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     or false: nullable `boolean`). In the Parquet file the metadata of a column says what it is: `kind` is setting,
     metric or result, and a metric has its `unit` and `meaning`.
 
-    Raises `StoreError` when the directory holds no results, or cannot be read.
+    Raises `StoreError` when the directory holds no flight yet, or cannot be read.
 
     >>> results = harness.load_results("out/wind")
     >>> results.query("plant == 'sixdof'").groupby("law.name")["range_error_rms_m"].median()
@@ -41,6 +41,11 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         table = _exported(folder / PARQUET, state(journal))
         if table is None:
             table = _table(journal)
+    if not len(table):
+        command = last_run(folder)["command"]
+        raise StoreError(
+            f"{folder}: has no flight yet: its run ended before the first, or is at it; to go on: {command}"
+        )
     return as_results(_declared(table).to_pandas())
 
 
