@@ -5,13 +5,16 @@ import os
 import re
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from click.shell_completion import ShellComplete
 
 from harness.cli._input import BadInput, flight_of, read_file
 from harness.cli._paths import writable, writable_folder
 from harness.cli.main import COMMANDS, Entry, load
+from harness.cli.main import harness as command_line
 from tests.builders import command, copied_airframe, invoke, python, words_of, write
 
 FILE = """\
@@ -326,3 +329,36 @@ def test_a_long_path_is_never_cut(file: Path, tmp_path: Path) -> None:
     run = invoke("run", file, "--out", out, "--set", "seed=[1,2]", "--workers", "0", "--log", "none").stdout
     assert f"results in {out}\nnext: harness show {out}, " in run
     assert invoke("check", deep / "none.toml").stderr == f"{deep / 'none.toml'}: No such file or directory\n"
+
+
+COMPLETED = [
+    ("", "f", ["fly"]),
+    ("list", "se", ["settings"]),
+    ("fly x.toml", "--ag", ["--against"]),
+    ("fly x.toml --set", "start.h", ["start.heading_deg=", "start.heading_deg=30.0"]),
+    ("run x.toml --set", "law.dir", ["law.direction=", "law.direction=paper", "law.direction=mirrored"]),
+    ("check x.toml --set", "law.direction=m", ["law.direction=mirrored"]),
+    ("predict x.toml --set", "plant=s", ["plant=sixdof"]),
+    ("fly x.toml --set", "aircraft=sky", ["aircraft=skywalker_x8"]),
+    ("fly x.toml --set", "inner_loop.rate_trim=", ["inner_loop.rate_trim=true", "inner_loop.rate_trim=false"]),
+    ("show out --where", "law.k2=", ["law.k2=12"]),
+    ("compare out --set", "assess.turn", ["assess.turn_ratio=", "assess.turn_ratio=0.05"]),
+    ("compare out --set", "law.", []),
+    ("fly x.toml --set", "wind.s", ["wind.steady_mps=", "wind.shear_mps_per_m="]),
+    ("fly x.toml --set", "nothing", []),
+]
+
+
+@pytest.mark.parametrize(("words", "begun", "offered"), COMPLETED)
+def test_the_shell_completes_keys_of_settings_and_values_of_a_closed_list(
+    words: str, begun: str, offered: list[str]
+) -> None:
+    shell = ShellComplete(command_line, {}, "harness", "_HARNESS_COMPLETE")
+    assert [item.value for item in shell.get_completions(words.split(), begun)] == offered
+
+
+def test_bash_is_given_the_completion() -> None:
+    words = {"_HARNESS_COMPLETE": "bash_complete", "COMP_WORDS": "harness\nfly\n--set\nplant=l", "COMP_CWORD": "3"}
+    main = "import sys; sys.argv[0] = 'harness'; from harness.cli.main import main; main()"
+    done = subprocess.run([sys.executable, "-c", main], env={**os.environ, **words}, capture_output=True, check=False)
+    assert done.stdout == b"plain,plant=lagged\n"

@@ -5,14 +5,19 @@ from pathlib import Path
 import click
 
 from harness.cli._paths import PATH
+from harness.cli._setting import MARGIN, SETTING
 
 
 @click.command()
 @click.argument("directories", metavar="DIR...", nargs=-1, required=True, type=PATH)
 @click.option("--by", metavar="KEY", help="The setting whose values are compared.  [default: plant, if several]")
 @click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
-@click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
-@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
+@click.option(
+    "--where", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Only flights with this setting; repeatable."
+)
+@click.option(
+    "--set", "overrides", multiple=True, type=MARGIN, metavar="assess.KEY=VALUE", help="Set a margin; repeatable."
+)
 @click.option("--map", "mapped", metavar="METRIC", help="Print this metric over the two numeric axes alone.")
 @click.option("--json", "form", flag_value="json", help="Print everything as one JSON object.")
 @click.option("--csv", "form", flag_value="csv", help="Print the paired differences as CSV.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from harness.cli._paths import PATH, PATH_OR_ROW
+from harness.cli._setting import SETTING
 
 if TYPE_CHECKING:
     from harness.review.live import Live
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("what", metavar="FILE|DIR:KEY", type=PATH_OR_ROW)
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
+@click.option(
+    "--set", "overrides", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Override a setting; repeatable."
+)
 @click.option("--rrd", type=PATH, help="Write a Rerun recording to this file.")
 @click.option("--live", is_flag=True, help="Stream the flight to an open viewer, `harness view`.")
 @click.option(

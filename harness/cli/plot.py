@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._setting import SETTING
+
 if TYPE_CHECKING:
     from harness.drawing import Picture
 
@@ -22,7 +24,9 @@ _MAP = "map"
     "--save", type=click.Path(path_type=Path), required=True, metavar="FILE", help="The figure: .png, .svg or .pdf."
 )
 @click.option("--metric", metavar="METRIC", help="Of --what map.  [default: range_error_rms_m]")
-@click.option("--where", multiple=True, metavar="KEY=VALUE", help="Of --what map: only flights with this setting.")
+@click.option(
+    "--where", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Of --what map: only flights with this setting."
+)
 def plot(
     places: tuple[str, ...], what: tuple[str, ...], save: Path, metric: str | None, where: tuple[str, ...]
 ) -> None:

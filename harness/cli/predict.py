@@ -5,11 +5,14 @@ from pathlib import Path
 import click
 
 from harness.cli._paths import PATH
+from harness.cli._setting import SETTING
 
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a setting; repeatable.")
+@click.option(
+    "--set", "overrides", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Override a setting; repeatable."
+)
 def predict(file: Path, overrides: tuple[str, ...]) -> None:
     """Predict the limit cycle of a flight without flying it.
 

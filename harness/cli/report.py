@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from harness.cli._paths import PATH
+from harness.cli._setting import MARGIN, SETTING
 
 
 @click.command()
@@ -13,8 +14,12 @@ from harness.cli._paths import PATH
 @click.option("--markdown", type=PATH, help="Write this Markdown file instead, without figures.")
 @click.option("--by", metavar="KEY", help="The setting whose values are compared.  [default: plant, if several]")
 @click.option("--baseline", metavar="VALUE", help="Compare the others with it.  [default: the lowest plant, or value]")
-@click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
-@click.option("--set", "overrides", multiple=True, metavar="assess.KEY=VALUE", help="Set a margin; repeatable.")
+@click.option(
+    "--where", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Only flights with this setting; repeatable."
+)
+@click.option(
+    "--set", "overrides", multiple=True, type=MARGIN, metavar="assess.KEY=VALUE", help="Set a margin; repeatable."
+)
 def report(
     directories: tuple[Path, ...],
     out: Path | None,

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from harness.cli._paths import PATH
+from harness.cli._setting import SETTING
 
 
 @click.command()
@@ -21,6 +22,7 @@ from harness.cli._paths import PATH
     "--set",
     "overrides",
     multiple=True,
+    type=SETTING,
     metavar="KEY=VALUE",
     help="Set a key, or several values of it; repeatable.",
 )

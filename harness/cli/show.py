@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from harness.cli._paths import PATH_OR_ROW
+from harness.cli._setting import SETTING
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,7 +19,9 @@ _MOST_LINES = 100
 
 @click.command()
 @click.argument("row", metavar="DIR|DIR:KEY", type=PATH_OR_ROW)
-@click.option("--where", multiple=True, metavar="KEY=VALUE", help="Only flights with this setting; repeatable.")
+@click.option(
+    "--where", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Only flights with this setting; repeatable."
+)
 @click.option("--sort", metavar="COLUMN", help="Sort by a metric or setting; -COLUMN: the largest first.")
 @click.option("--columns", metavar="A,B", help="Print these metrics and settings.  [default: what varies, and metrics]")
 @click.option("--limit", type=click.IntRange(1), metavar="N", help="Print N flights.  [default: 100; of --csv all]")

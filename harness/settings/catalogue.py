@@ -33,6 +33,7 @@ UNITS = {
     "rad2": "rad²",
 }
 REQUIRED = "–"  # instead of a default
+TRUTH = "true or false"
 _BOUNDS = {Gt: ">", Ge: "≥", Lt: "<", Le: "≤"}
 
 
@@ -54,6 +55,7 @@ class SettingsTable(NamedTuple):
     prefix: str  # of its keys in their dotted names
     kind: type
     inherited: type | None = None  # what its keys share with others, which has an entry
+    is_list: bool = False  # whether it is an entry of a list of tables: `--set` cannot name its keys
 
 
 TABLES = (
@@ -68,8 +70,8 @@ TABLES = (
         for key, setting in schema_of(Flight).settings.items()
         if setting.table and isinstance(setting.table.make, type)
     ),
-    SettingsTable("An entry of flight.target.segments", "target.segments.", Segment),
-    SettingsTable("An entry of flight.wind.gusts", "wind.gusts.", Gust),
+    SettingsTable("An entry of flight.target.segments", "target.segments.", Segment, is_list=True),
+    SettingsTable("An entry of flight.wind.gusts", "wind.gusts.", Gust, is_list=True),
     SettingsTable("[assess]", "assess.", Assess),
 )
 
@@ -116,7 +118,7 @@ def _in_file(value: object, unit: Unit) -> object:
 
 def _allowed(setting: Setting) -> str:
     """What a value may be, in words."""
-    kind = {float: "number", int: "whole number", str: "text", bool: "true or false"}.get(setting.kind, "table")  # type: ignore[call-overload]
+    kind = {float: "number", int: "whole number", str: "text", bool: TRUTH}.get(setting.kind, "table")  # type: ignore[call-overload]
     bounds = " and ".join(f"{_BOUNDS[type(b)]} {_plain(getattr(b, type(b).__name__.lower()))}" for b in setting.bounds)
     words = f"{kind} {bounds}".strip()
     if setting.infinite:
