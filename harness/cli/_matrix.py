@@ -67,7 +67,9 @@ def print_time(size: Survey, done: int, workers: int, log: str | None) -> None:
         return
     recorded = {"all": flights, "none": 0, "failed": 0}.get(log or "", min(RECORDED, flights))
     room = _size(disk(size, recorded))
-    click.echo(f"about {duration(size.seconds / workers)} with {counted(workers, 'worker')}, {room} of disk")
+    click.echo(
+        f"about {duration(sum(size.typical.values()) / workers)} with {counted(workers, 'worker')}, {room} of disk"
+    )
 
 
 def fly_matrix(matrix: Matrix, out: Path, options: Options) -> Progress:

@@ -87,8 +87,8 @@ def _line(state: Progress) -> str:
     if state.done and state.seconds:
         rate = state.done / state.seconds
         parts.append(f"{rate:.3g} flights/s")
-        if left := state.total - finished:
-            parts.append(f"{duration(left / rate)} left")
+        if state.left is not None and finished < state.total:
+            parts.append(f"{duration(state.left)} left")
     return ", ".join(parts)
 
 

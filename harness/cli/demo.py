@@ -38,8 +38,10 @@ def demo(out: Path) -> None:
     try:
         matrix = read_matrix(read_settings(EXPERIMENT))
         done = positions_done(matrix, out, retry_failed=False)
-        print_survey(matrix, surveyed(matrix, done=done), len(done))
-        progress = fly_matrix(matrix, out, Options(workers=os.cpu_count() or 1, log="all"))
+        size = surveyed(matrix, done=done)
+        print_survey(matrix, size, len(done))
+        options = Options(workers=os.cpu_count() or 1, log="all", typical=size.typical)
+        progress = fly_matrix(matrix, out, options)
     except (StoreError, WorkersError) as error:
         raise BadInput(str(error)) from None
     click.echo()

@@ -82,7 +82,14 @@ def run(
             print_time(size, len(done), max(1, workers), log)
             return
         timeout = flight_timeout or TIMEOUT
-        options = Options(workers=workers, limit=limit, log=log, retry_failed=retry is not None, timeout=timeout)
+        options = Options(
+            workers=workers,
+            limit=limit,
+            log=log,
+            retry_failed=retry is not None,
+            timeout=timeout,
+            typical=size.typical,
+        )
         progress = fly_matrix(matrix, out, options)
     except (SettingsError, StoreError, WorkersError) as error:
         raise BadInput(str(error)) from None

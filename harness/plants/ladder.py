@@ -125,7 +125,7 @@ PLANTS: Mapping[str, PlantKind] = MappingProxyType(
             adds="lag of the heading rate",
             make=_lagged,
             files=_identified_files,
-            cost=Cost(start=0.012, period=20e-6),
+            cost=Cost(start=0.003, period=20e-6),
             warnings=_identification_warnings,
         ),
         "coordinated": PlantKind(
@@ -134,7 +134,7 @@ PLANTS: Mapping[str, PlantKind] = MappingProxyType(
             make=_coordinated,
             banks=True,
             files=_identified_files,
-            cost=Cost(start=0.012, period=45e-6),
+            cost=Cost(start=0.003, period=45e-6),
             warnings=_identification_warnings,
         ),
         "sixdof": PlantKind(
@@ -144,7 +144,7 @@ PLANTS: Mapping[str, PlantKind] = MappingProxyType(
             banks=True,
             files=_sixdof_files,
             libraries=("jsbsim",),
-            cost=Cost(start=0.012, step=6.5e-6),
+            cost=Cost(start=0.003, step=6.5e-6),
         ),
     }
 )

@@ -13,7 +13,7 @@ from harness.runs.matrix import Matrix
 from harness.runs.recordings import lacks_recording, recording_path
 from harness.runs.row import row
 from harness.runs.store import JOURNAL, Store, examples, positions, reading
-from harness.runs.wall_time import WallTime
+from harness.runs.wall_time import TimeLeft, WallTime
 from harness.runs.workers import TIMEOUT, Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
 
@@ -30,6 +30,7 @@ class Options:
     log: str | None = None  # one of LOGS; None: all of up to `RECORDED` flights, otherwise a sample
     retry_failed: bool = False
     timeout: float = TIMEOUT  # s of a worker's own time in which a flight gains no simulated time
+    typical: Mapping[str, float] = field(default_factory=dict)  # s: wall time of the flights to fly, by plant
     fly: Fly = fly_task
 
 
@@ -46,7 +47,7 @@ class Progress:
     recorded: int = 0  # of the earlier ones: flown again for a recording that is missing
     unrecorded: list[str] = field(default_factory=list)  # what went wrong, for each recording that is missing
     seconds: float = 0.0  # since the first flight was sent out
-    ahead: float = 0.0  # estimated time of one worker for the flights left, s
+    left: float | None = None  # estimated time until the end, s; None while it is unknown
 
 
 def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
@@ -63,18 +64,20 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
         count = len(matrix)
         progress = Progress(count if options.limit is None else min(count, options.limit))
         pending: dict[str, _Pending] = {}
-        wall_time = WallTime()
-        tasks = _tasks(matrix, store, options, progress, pending)
+        wall_time, time_left = WallTime(), TimeLeft(options.typical, options.workers)
+        tasks = _tasks(matrix, store, options, progress, pending, time_left)
         flying = fly_all(
             tasks, folder, workers=options.workers, wall_time=wall_time, timeout=options.timeout, fly=options.fly
         )
         begin = time.monotonic()
         try:
             for done in flying:
+                now = time.monotonic() - begin
                 if done is not None:
                     _keep(store, done, pending.pop(done.task.key), progress)
+                    time_left.learn(done.task.flight, done.result.result.seconds, now)
                 store.tick()
-                progress.out, progress.seconds = len(pending), time.monotonic() - begin
+                progress.out, progress.seconds, progress.left = len(pending), now, time_left.seconds(now)
                 yield progress
         finally:
             flying.close()
@@ -115,7 +118,12 @@ def _count_earlier(progress: Progress, outcome: Outcome) -> None:
 
 
 def _tasks(
-    matrix: Matrix, store: Store, options: Options, progress: Progress, pending: dict[str, _Pending]
+    matrix: Matrix,
+    store: Store,
+    options: Options,
+    progress: Progress,
+    pending: dict[str, _Pending],
+    time_left: TimeLeft,
 ) -> Iterator[Task]:
     """The flights that are not done yet or lack their recording, one at a time, each entered in `pending`."""
     number = matrix.identifier
@@ -140,6 +148,8 @@ def _tasks(
         earlier = known.get(key)
         if key in met:
             progress.repeated, progress.total = progress.repeated + 1, progress.total - 1
+            if this:
+                time_left.leave_out(flight)
         elif earlier and not (this and lacks_recording(store.folder, key, record, earlier)):
             _count_earlier(progress, earlier)
         elif this:

@@ -32,7 +32,7 @@ class Survey:
 
     flights: int = 0
     random: int = 0  # flights whose seed matters
-    seconds: float = 0.0  # estimated wall time of one process
+    typical: dict[str, float] = field(default_factory=dict)  # s: wall time of the flights of each plant, in one process
     periods: int = 0  # guidance periods, of all flights together
     mistakes: list[str] = field(default_factory=list)
     varies: dict[str, int] = field(default_factory=dict)  # the number of values of each axis
@@ -85,7 +85,7 @@ def survey(matrix: Matrix, limit: int | None = None, done: Collection[int] = ())
             shared.flights += 1
             shared.alike &= warning == shared.text
         total.random += flight.random or bool(matrix.draws)
-        total.seconds += flight.seconds
+        total.typical[flight.plant] = total.typical.get(flight.plant, 0.0) + flight.seconds
         total.periods += flight.periods
         if total.flights % 500 == 0:
             yield total
@@ -101,6 +101,7 @@ class _FlightSurvey:
 
     warnings: tuple[str, ...]
     random: bool
+    plant: str
     seconds: float
     periods: int
     start: object  # equal for flights that have the same start
@@ -136,4 +137,6 @@ class _Seen:
 def _flight_survey(flight: Flight) -> _FlightSurvey:
     random = flight.estimator.filters or flight.wind.turbulence != "none"
     start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
-    return _FlightSurvey(tuple(warnings(flight)), random, typical_wall_time(flight), flight.periods, start)
+    return _FlightSurvey(
+        tuple(warnings(flight)), random, flight.plant, typical_wall_time(flight), flight.periods, start
+    )
