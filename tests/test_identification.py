@@ -1,6 +1,7 @@
 """What `harness identify` measures and fits: on responses that are known, and on the airframes."""
 
 import math
+import re
 from dataclasses import astuple, replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import aircraft
+from harness.cli import _progress
 from harness.identification.fit import (
     Training,
     airspeed_change,
@@ -132,14 +134,21 @@ def test_an_identification_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert read(airframe) == [other, one]
 
 
-def test_the_command_identifies_draws_and_keeps(tmp_path: Path) -> None:
+def test_the_command_identifies_draws_keeps_and_says_how_long_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The whole of `harness identify`, on a folder of the user's own: as `make identify` left the airframe itself."""
     airframe = copied_airframe("skywalker_x8", tmp_path / "skywalker_x8")
     aircraft.identified(airframe).write_text("damaged", encoding="utf-8")
+    monkeypatch.setattr(_progress, "_EVERY", 0.0)  # a line after each part
     result = invoke("identify", airframe, "--out", tmp_path / "plots")
     assert result.exit_code == 0, result.output
-    for told in ("63 %", "bandwidth", "turn ratio", "delay", "damping", "lagged  coordinated"):
-        assert told in result.output
+    told = [line for line in result.stderr.splitlines() if line.startswith("identifying skywalker_x8: ")]
+    assert len(told) == 34  # 32 flights and two fits
+    assert all(re.search(r": \d+ % done, \d+ s left$", line) for line in told)
+    assert "100 % done" in told[-1]
+    for words in ("63 %", "bandwidth", "turn ratio", "delay", "damping", "lagged  coordinated"):
+        assert words in result.output
     assert sorted(path.name for path in (tmp_path / "plots").iterdir()) == [
         "skywalker_x8_bode.svg", "skywalker_x8_step.svg",
     ]  # fmt: skip
@@ -152,7 +161,7 @@ def test_the_command_identifies_draws_and_keeps(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["ultra_stick"], "AIRCRAFT: is 'ultra_stick', must be one of aerosonde, skywalker_x8, ultra_stick_25e"),
+        (["ultra_stick"], 'AIRCRAFT: is "ultra_stick", must be one of aerosonde, skywalker_x8, ultra_stick_25e'),
         (
             ["aerosonde", "--airspeed", "5"],
             "--airspeed: no level trim at 5 m/s, 150 m high; aerosonde flies from 18 to 35 m/s",

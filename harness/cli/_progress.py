@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import click
 
@@ -24,26 +24,35 @@ def busy(what: str) -> AbstractContextManager[object]:
     return terminal.status(what) if terminal.is_terminal else nullcontext()
 
 
+class Advance(Protocol):
+    """Called after a part of a job; `work` is how much of it that was."""
+
+    def __call__(self, work: float = 1.0) -> None: ...
+
+
 @contextmanager
-def progress(what: str, parts: int) -> Iterator[Callable[[], None]]:
-    """The function to call after each of so many parts of a job."""
+def progress(what: str, whole: float, *, counted: bool = True) -> Iterator[Advance]:
+    """The function to call after each part of a job, whose parts are `counted`, or are work of different size."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn
     from rich.progress import Progress as Bar
 
     terminal = Console(stderr=True)
-    columns = (*Bar.get_default_columns(), MofNCompleteColumn())
+    columns = (*Bar.get_default_columns(), *([MofNCompleteColumn()] if counted else []))
     with Bar(*columns, console=terminal, transient=True, disable=not terminal.is_terminal) as bar:
-        task = bar.add_task(what, total=parts)
-        done, printed = 0, time.monotonic()
+        task = bar.add_task(what, total=whole)
+        begin = printed = time.monotonic()
+        done = 0.0
 
-        def advance() -> None:
+        def advance(work: float = 1.0) -> None:
             nonlocal done, printed
-            bar.advance(task)
-            done += 1
-            if not terminal.is_terminal and time.monotonic() - printed >= _EVERY:
-                printed = time.monotonic()
-                click.echo(f"{what}: {done} of {parts}", err=True)
+            bar.advance(task, work)
+            done += work
+            now = time.monotonic()
+            if not terminal.is_terminal and now - printed >= _EVERY:
+                printed = now
+                so_far = f"{done:g} of {whole:g}" if counted else f"{100 * done / whole:.0f} % done"
+                click.echo(f"{what}: {so_far}, {duration((now - begin) * (whole / done - 1.0))} left", err=True)
 
         yield advance
 

@@ -17,7 +17,8 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     AIRCRAFT is a name or a folder. Flies steps and sweeps of the heading-rate command on the 6-DOF plant and fits the
     plants `lagged` and `coordinated` to them. Prints the step and frequency response, the fit, and its errors on
     manoeuvres that the fit did not use. The parameters are kept in identified.toml beside the aircraft, for each
-    airspeed; a step plot and a Bode plot are written to OUT. Takes about 10 s.
+    airspeed; a step plot and a Bode plot are written to OUT. Takes 10 s on
+    a quick machine and a minute on a slow or busy one; how long is left is said on the way.
 
     \b
     Example:
@@ -52,7 +53,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     except IdentifiedError:
         others = []  # a damaged file is written anew
     try:
-        with progress(f"flying {airframe.name}", job.FLIGHTS) as advance:
+        with progress(f"identifying {airframe.name}", job.WORK, counted=False) as advance:
             identification = job.identify(airframe, speed, done=advance)
     except PlantError as error:
         raise BadInput(f"--airspeed: {error}") from None

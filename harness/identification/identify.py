@@ -1,7 +1,7 @@
 """Identifies an airframe's inner loop: flies manoeuvres on the plant sixdof, fits responses, and validates them."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from harness.identification.manoeuvres import (
 from harness.plants.coordinated import bank_command
 from harness.plants.identified import Identified, Sweep
 from harness.plants.plant import Plant, Start
+from harness.plants.response import Response
 from harness.plants.state import State
 from harness.plants.turn import rate_of_turn
 from harness.series import rms
@@ -93,25 +94,37 @@ class Identification:
     airspeed_error: tuple[float, float]  # RMS, m/s, in the largest step: of the fitted hold, and of constant airspeed
 
 
-FLIGHTS = 2 * len(TRAINING) + len(HELD_OUT) + len(CHATTER) + len(STEPS_DEG_S) + len(SWEPT) + len(_AIRSPEED_STEPS_DEG_S)
+_FIT = 1400.0  # the work of fitting one response, see `WORK`
+# The work of an identification, in seconds of simulated flight
+WORK = (
+    STEP * sum(map(len, (*TRAINING.values(), *TRAINING.values(), *HELD_OUT.values(), *CHATTER.values())))
+    + _STEP_LENGTH * (len(STEPS_DEG_S) + 2 * len(_AIRSPEED_STEPS_DEG_S))
+    + 2 * SWEEP_PERIOD * len(SWEPT)
+    + 2 * _FIT
+)
 
 
-def identify(airframe: Path, airspeed: float, done: Callable[[], None] = lambda: None) -> Identification:
-    """Flies, fits and validates at this airspeed, m/s; `done` is called after each of `FLIGHTS` flights.
+def identify(airframe: Path, airspeed: float, done: Callable[[float], None] = lambda work: None) -> Identification:
+    """Flies, fits and validates at this airspeed, m/s; `done` is called after each part of `WORK`, with its size.
 
     Raises `PlantError` when a manoeuvre cannot start, `End` when one ends early.
     """
 
     def fly(command: Array, rate_trim: bool = True) -> Record:
         record = flown(airframe, airspeed, command, rate_trim)
-        done()
+        done(STEP * len(command))
         return record
+
+    def fitted_to(records: Sequence[Training]) -> Response:
+        response = fit(records)
+        done(_FIT)
+        return response
 
     limit = aircraft.limits(airframe).bank
     steps = tuple(step_response(fly(held([rate], _STEP_LENGTH))) for rate in STEPS_DEG_S)
     sweeps = {name: frequency_response(fly(sweep(rms, periods=2))) for name, rms in SWEPT.items()}
-    heading_rate = fit([of_heading_rate(fly(command)) for command in TRAINING.values()])
-    bank = fit([of_bank(fly(command, rate_trim=False), limit) for command in TRAINING.values()])
+    heading_rate = fitted_to([of_heading_rate(fly(command)) for command in TRAINING.values()])
+    bank = fitted_to([of_bank(fly(command, rate_trim=False), limit) for command in TRAINING.values()])
     entries = [of_airspeed(fly(held([rate, 0.0], _STEP_LENGTH))) for rate in _AIRSPEED_STEPS_DEG_S]
     fitted = Identified(
         airspeed=airspeed, heading_rate=heading_rate, bank=bank, hold=fit_airspeed(entries), bank_limit=limit,
