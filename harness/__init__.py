@@ -27,11 +27,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from autopilot.estimator import Estimator
     from autopilot.guidance import Guidance, Law, Observation
-    from autopilot.laws import law
     from harness.comparison import compare
-    from harness.error import HarnessError, SettingsError
+    from harness.error import ArgumentError, HarnessError, RecordingError, SettingsError
     from harness.flight import Flight, InnerLoop, MetricSettings
-    from harness.interface import metrics, read_flight, record, run, simulate
+    from harness.interface import law, metrics, read_flight, record, run, simulate
     from harness.log import FlightLog
     from harness.margins import Assess
     from harness.plants.plant import Outcome, PlantError, Start
@@ -47,6 +46,7 @@ if TYPE_CHECKING:
     from harness.world.wind import Gust, Wind
 
 __all__ = [
+    "ArgumentError",
     "Assess",
     "CompareError",
     "Comparison",
@@ -62,6 +62,7 @@ __all__ = [
     "Observation",
     "Outcome",
     "PlantError",
+    "RecordingError",
     "Segment",
     "SettingsError",
     "Start",
@@ -86,11 +87,10 @@ __all__ = [
 _HOMES = {
     "autopilot.estimator": ["Estimator"],
     "autopilot.guidance": ["Guidance", "Law", "Observation"],
-    "autopilot.laws": ["law"],
     "harness.comparison": ["compare"],
-    "harness.error": ["HarnessError", "SettingsError"],
+    "harness.error": ["ArgumentError", "HarnessError", "RecordingError", "SettingsError"],
     "harness.flight": ["Flight", "InnerLoop", "MetricSettings"],
-    "harness.interface": ["metrics", "read_flight", "record", "run", "simulate"],
+    "harness.interface": ["law", "metrics", "read_flight", "record", "run", "simulate"],
     "harness.log": ["FlightLog"],
     "harness.margins": ["Assess"],
     "harness.plants.plant": ["Outcome", "PlantError", "Start"],

@@ -16,6 +16,14 @@ class SettingsError(HarnessError, ValueError):
         self.lines = list(lines)
 
 
+class ArgumentError(HarnessError, ValueError):
+    """An argument of a function that cannot be used."""
+
+
+class RecordingError(HarnessError, OSError, ValueError):
+    """A recording that cannot be read or written, or does not hold what is asked for."""
+
+
 def did_you_mean(word: object, known: Iterable[str]) -> str:
     """The end of a message about an unknown word: the nearest of those known, or nothing."""
     nearest = get_close_matches(str(word), list(known), n=1)

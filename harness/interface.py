@@ -4,13 +4,15 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.laws import LAWS, law
+from autopilot import laws
+from autopilot.guidance import Law
 from harness import loop
-from harness.error import SettingsError
+from harness.error import ArgumentError, HarnessError, RecordingError, SettingsError
 from harness.flight import Flight
 from harness.log import FlightLog
 from harness.settings import document, flight_from_document
@@ -22,6 +24,24 @@ if TYPE_CHECKING:
     from harness.runs.run import Progress
 
 _EVERY = 1.0  # s between two lines of progress
+
+
+def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
+    """A guidance law by name with a named gain set, the law's default without one; a frozen value.
+
+    `parameters` override single gains and what all laws have: `standoff` (m), `max_heading_rate` (rad/s, not degrees),
+    `direction`, `airspeed`, `command`. `harness list laws` shows all of them.
+
+    Raises `ArgumentError` for a law, a gain set or a parameter that there is not, with those that there are;
+    FutureWarning for the former name of a gain set.
+
+    >>> harness.law("nftsm")
+    >>> harness.law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
+    """
+    try:
+        return laws.law(name, gains, **parameters)
+    except ValueError as error:
+        raise ArgumentError(str(error)) from None
 
 
 def simulate(flight: Flight, watch: "Watch | None" = None) -> FlightLog:
@@ -59,7 +79,7 @@ def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title:
     Of several the first is the reference, drawn wide and pale under the others. `notes` is Markdown, shown above the
     results. `harness view PATH` shows it, `read_flight(PATH)` reads it back.
 
-    Raises OSError when it cannot be written, ValueError for more flights than can be told apart, `SettingsError` for a
+    Raises `RecordingError` when it cannot be written, or for more flights than can be told apart; `SettingsError` for a
     law that has no name.
 
     >>> harness.record(log, "flight.rrd")
@@ -69,7 +89,10 @@ def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title:
 
     path = Path(path)
     logs = {log.flight.plant: log} if isinstance(log, FlightLog) else log
-    write_recording(path, logs, title or path.stem, notes)
+    if not isinstance(logs, Mapping):
+        raise ArgumentError(f"log is {log!r}, must be a harness.FlightLog, or several by name")
+    with _recording(path):
+        write_recording(path, logs, title or path.stem, notes)
     return path
 
 
@@ -78,14 +101,14 @@ def read_flight(path: str | Path, flight: str | None = None) -> "pd.DataFrame":
 
     `flight` names it where the file holds several. Columns as in `FlightLog`: SI, rad, north-east-down.
 
-    Raises OSError when the file cannot be read, ValueError when there is no such flight in it; the message names those
-    that there are.
+    Raises `RecordingError` when the file cannot be read or holds no such flight; the message names those that it holds.
 
     >>> harness.read_flight("pair.rrd", "sixdof")["range_error"].iloc[-1]
     """
     from harness.review.reading import read_recording
 
-    return read_recording(Path(path), flight)
+    with _recording(Path(path)):
+        return read_recording(Path(path), flight)
 
 
 def run(
@@ -118,8 +141,8 @@ def run(
     - `progress`: print how far it is to standard error, once a second.
 
     Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
-    used; `WorkersError` when the processes cannot fly; ValueError for an option that there is not. A flight that fails
-    is a row, not an error.
+    used; `WorkersError` when the processes cannot fly; `ArgumentError` for an option that there is not. A flight that
+    fails is a row, not an error.
 
     >>> results = harness.run("experiments/gains.toml", out="out/gains", progress=True)
     >>> results.groupby("plant")["convergence_time_s"].median()
@@ -134,13 +157,13 @@ def run(
 
     for name, value, least in (("workers", workers, 0), ("limit", limit, 1)):
         if value is not None and value < least:
-            raise ValueError(f"{name} is {value}, must be None or at least {least}")
+            raise ArgumentError(f"{name} is {value}, must be None or at least {least}")
     if timeout is not None and not timeout > 0.0:
-        raise ValueError(f"timeout is {timeout:g}, must be None or above 0 s")
+        raise ArgumentError(f"timeout is {timeout:g}, must be None or above 0 s")
     if timeout is not None and workers == 0:
-        raise ValueError("timeout needs a worker to end: workers must be None or at least 1")
+        raise ArgumentError("timeout needs a worker to end: workers must be None or at least 1")
     if log is not None and log not in LOGS:
-        raise ValueError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
+        raise ArgumentError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
     path, out = Path(path), Path(out)
     workers = (os.cpu_count() or 1) if workers is None else workers
     matrix = read_matrix(read_settings(path, overrides), draft=True)
@@ -152,6 +175,19 @@ def run(
         pass
     export(out)
     return load_results(out)
+
+
+@contextmanager
+def _recording(path: Path) -> Iterator[None]:
+    """What goes wrong with a recording, as a `RecordingError`."""
+    try:
+        yield
+    except HarnessError:
+        raise
+    except OSError as error:
+        raise RecordingError(f"{error.filename or path}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise RecordingError(str(error)) from error
 
 
 def _printed(states: "Iterator[Progress]") -> "Iterator[Progress]":
@@ -189,6 +225,6 @@ def _checked(flight: Flight) -> Flight:
     if target.track is not None:
         target = replace(target, track=str(target.track))
     flight = replace(flight, aircraft=str(flight.aircraft), target=target)
-    is_own = type(flight.law) not in [kind.value for kind in LAWS.values()]  # a law of one's own checks itself
-    flight_from_document(document(replace(flight, law=law("nftsm")) if is_own else flight))
+    is_own = type(flight.law) not in [kind.value for kind in laws.LAWS.values()]  # a law of one's own checks itself
+    flight_from_document(document(replace(flight, law=laws.law("nftsm")) if is_own else flight))
     return flight

@@ -169,7 +169,7 @@ def test_whole_numbers_and_floats_are_the_same_flight() -> None:
         (replace(FLIGHT, plant="kinematc"), r"flight.plant: is \"kinematc\".*did you mean 'kinematic'"),
         (replace(FLIGHT, duration=-1.0), "flight.duration_s: is -1.0, must be a number > 0"),
         (replace(FLIGHT, start=harness.Start(airspeed=0.0)), "flight.start.airspeed_mps: is 0.0, must be a number >="),
-        (replace(FLIGHT, aircraft="aerosond"), "flight.aircraft: is 'aerosond'.*did you mean 'aerosonde'"),
+        (replace(FLIGHT, aircraft="aerosond"), "flight.aircraft: is .aerosond..*did you mean 'aerosonde'"),
         (replace(FLIGHT, law=harness.law("nftsm", "paper_1", k2=-1.0)), "flight.law.k2: is -1.0, must be a number > 0"),
         (replace(FLIGHT, law="nftsm"), "flight.law: is 'nftsm', must be a law"),  # type: ignore[arg-type]
         (replace(FLIGHT, wind=(3.0, 0.0)), r"flight.wind: is \(3.0, 0.0\), must be a harness.Wind"),  # type: ignore[arg-type]
@@ -215,6 +215,35 @@ def test_an_airframe_and_a_track_may_be_paths(tmp_path: Path) -> None:
     log = harness.simulate(by_path)
     assert log.flight == by_text
     assert log.digest == harness.simulate(by_text).digest
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda log, out: harness.law("nfstm"),
+        lambda log, out: harness.load_flight(out / "none.toml"),
+        lambda log, out: harness.simulate(replace(FLIGHT, plant="plane")),
+        lambda log, out: harness.simulate(replace(SIXDOF, start=harness.Start(airspeed=5.0))),
+        lambda log, out: log.plot(panels=["range"]),
+        lambda log, out: harness.record(log, out / "none" / "flight.rrd"),
+        lambda log, out: harness.record({}, out / "flight.rrd"),
+        lambda log, out: harness.record("log", out / "flight.rrd"),  # type: ignore[arg-type]
+        lambda log, out: harness.read_flight(out / "none.rrd"),
+        lambda log, out: harness.read_flight(out / "journal.sqlite"),
+        lambda log, out: harness.run(out / "none.toml", out),
+        lambda log, out: harness.run(EXPERIMENTS / "stationary.toml", out, workers=-1),
+        lambda log, out: harness.run(EXPERIMENTS / "stationary.toml", out / "journal.sqlite", workers=0),
+        lambda log, out: harness.load_results(out / "none"),
+        lambda log, out: harness.compare(out / "none"),
+        lambda log, out: harness.compare(out, by="wind"),
+    ],
+)
+def test_whatever_is_wrong_with_a_value_is_a_harness_error_of_one_sentence(
+    call: Callable[[harness.FlightLog, Path], object], log: harness.FlightLog, out: Path
+) -> None:
+    with pytest.raises(harness.HarnessError) as raised:
+        call(log, out)
+    assert len(str(raised.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -423,7 +452,7 @@ def test_flights_of_two_tables_can_be_compared_though_their_rows_have_the_same_n
         ({"by": "plnt"}, "by: no setting is called 'plnt' - did you mean 'plant'"),
         ({"by": "range_error_rms_m"}, "by: no setting is called 'range_error_rms_m'"),
         ({"where": {"law.gain": "paper"}}, "where: no setting is called 'law.gain' - did you mean 'law.gains'"),
-        ({"where": {"law.gains": "papr"}}, "where: no flight has law.gains = 'papr' - did you mean 'paper'.*there is"),
+        ({"where": {"law.gains": "papr"}}, "where: no flight has law.gains = .papr. - did you mean 'paper'.*there is"),
         ({"baseline": "kinematc"}, "there is kinematic, sixdof"),
     ],
 )

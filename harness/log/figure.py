@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from harness.drawing import COLOURS, COLUMN, FAINT, INK, PAGE, Picture
 from harness.drawing import picture as drawn
-from harness.error import did_you_mean
+from harness.error import ArgumentError, did_you_mean
 from harness.log.flight_log import FlightLog
 from harness.log.metric import Signals
 from harness.plants.plant import Outcome
@@ -37,7 +37,7 @@ _LEAST_ERROR = 1e-6  # m: what is smaller is rounding
 def picture(flights: Flights, panels: Sequence[str] = ()) -> Picture:
     """These panels of the flights as a figure in print size; without a choice all, of many flights the clearest.
 
-    ValueError for more flights than there are colours, a flight without a row, or panels that no flight here has.
+    `ArgumentError` for more flights than there are colours, a flight without a row, or panels that no flight here has.
     """
     kept = panels_of(flights, panels)
     columns = _columns(kept)
@@ -50,18 +50,18 @@ def picture(flights: Flights, panels: Sequence[str] = ()) -> Picture:
 def panels_of(flights: Flights, panels: Sequence[str] = ()) -> list[str]:
     """The panels that can be drawn of those asked for. Errors as `picture`."""
     if not 1 <= len(flights) <= MOST:
-        raise ValueError(f"{len(flights)} flights: up to {MOST} can be told apart")
+        raise ArgumentError(f"{len(flights)} flights: up to {MOST} can be told apart")
     for name, log in flights.items():
         if not len(log):
-            raise ValueError(f"{name}: nothing to draw: {log.reason}")
+            raise ArgumentError(f"{name}: nothing to draw: {log.reason}")
     for name in panels:
         if name not in PANELS:
-            raise ValueError(f"no panel {name!r}{did_you_mean(name, PANELS)}; the panels are {', '.join(PANELS)}")
+            raise ArgumentError(f"no panel {name!r}{did_you_mean(name, PANELS)}; the panels are {', '.join(PANELS)}")
     usual = list(PANELS) if len(flights) <= _MOST_BY_ALL else ["track", "error", "spectrum"]
     kept = [name for name in panels or usual if any(PANELS[name].has(log) for log in flights.values())]
     if not kept:
         plants = ", ".join(dict.fromkeys(log.flight.plant for log in flights.values()))
-        raise ValueError(f"no flight here has {' or '.join(panels)} (plant {plants})")
+        raise ArgumentError(f"no flight here has {' or '.join(panels)} (plant {plants})")
     return kept
 
 

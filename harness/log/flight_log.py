@@ -131,7 +131,7 @@ class FlightLog:
         its command, in deg; "sideslip"; "spectrum" of the command while circling is judged. Without a choice all that
         the plants have, of more than two flights the clearest. A notebook shows the figure by itself.
 
-        ValueError for what cannot be drawn: more flights than colours, a flight without a row, an unknown panel.
+        `ArgumentError` for what cannot be drawn: more flights than colours, a flight without a row, an unknown panel.
 
         >>> log.plot().savefig("flight.pdf")
         >>> log.plot(other, panels=["track", "error"])
