@@ -167,9 +167,15 @@ def run(
     path, out = Path(path), Path(out)
     workers = (os.cpu_count() or 1) if workers is None else workers
     matrix = read_matrix(read_settings(path, overrides), draft=True)
-    for _ in survey(matrix, limit, positions_done(matrix, out, retry_failed=retry_failed)):
-        pass  # every mistake is found before the first flight
-    options = Options(workers=workers, limit=limit, log=log, retry_failed=retry_failed, timeout=timeout or TIMEOUT)
+    *_, size = survey(matrix, limit, positions_done(matrix, out, retry_failed=retry_failed))  # finds every mistake
+    options = Options(
+        workers=workers,
+        limit=limit,
+        log=log,
+        retry_failed=retry_failed,
+        timeout=timeout or TIMEOUT,
+        typical=size.typical,
+    )
     states = fly(matrix, out, options)
     for _ in _printed(states) if progress else states:
         pass
@@ -205,7 +211,8 @@ def _printed(states: "Iterator[Progress]") -> "Iterator[Progress]":
 
 def _line(state: "Progress") -> str:
     done = state.earlier + state.done
-    return f"{done} of {state.total} flights done, {state.failed} failed, {state.seconds:.0f} s"
+    left = f", about {state.left:.0f} s left" if state.left and done < state.total else ""
+    return f"{done} of {state.total} flights done, {state.failed} failed, {state.seconds:.0f} s{left}"
 
 
 def _checked(flight: Flight) -> Flight:

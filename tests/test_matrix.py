@@ -346,3 +346,13 @@ def test_a_setting_that_is_wrong_makes_no_other_one_wrong(matrix: Read) -> None:
         list(survey(matrix(text.replace("plant = []", "seed = [1, 2]"))))
     (airspeed,) = caught.value.lines
     assert 'flight.start.airspeed_mps: is "fast"' in airspeed
+
+
+def test_a_file_without_flight_is_told_of_that_alone(tmp_path: Path) -> None:
+    file = write(tmp_path / "m.toml", '[matrix]\nseed = [-1]\n"law.k2" = [1.0]\n')
+    with pytest.raises(SettingsError) as caught:
+        list(survey(read_matrix(read_settings(file), draft=True)))
+    assert [line.partition(": ")[2] for line in caught.value.lines] == [
+        "flight: is missing, must be a table",
+        "flight.seed: is -1, must be a whole number >= 0 and <= 1e+15",
+    ]

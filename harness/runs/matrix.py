@@ -160,7 +160,8 @@ def read_matrix(file: SettingsFile, *, draft: bool = False) -> Matrix:
     A `draft` holds its mistakes, for `survey`, which tells them together with those of the flights.
     """
     experiment, mistakes = file.draft()
-    mistaken: dict[str, int] = {}
+    is_table = isinstance(file.document.get("flight"), Mapping)
+    mistaken = {} if is_table else dict.fromkeys(("plant", "law.name"), 0)  # missing with it
     fixed = [key[1:] for key in file.overrides]
     file, given, more = _given(file, mistakes, mistaken)
     blocks = [
