@@ -37,10 +37,21 @@ class Identity(NamedTuple):
 def identity(flight: Flight) -> Identity:
     """The key of a flight with its settings and version. Raises OSError when a file that it reads is missing."""
     settings, version = document(flight), version_of(flight)
-    hashed_settings = settings
-    if settings["target"]["track"] is not None:  # its content counts, not its path
-        hashed_settings = {**settings, "target": {**settings["target"], "track": "content"}}
+    hashed_settings = dict(settings)  # of a file or a folder its content counts, not its path
+    if settings["target"]["track"] is not None:
+        hashed_settings["target"] = {**settings["target"], "track": "content"}
+    if flight.aircraft not in aircraft.names():
+        hashed_settings["aircraft"] = _of_folder(flight.aircraft)
     return Identity(hashed({"settings": hashed_settings, "version": version.number}), settings, version)
+
+
+def _of_folder(airframe: str) -> dict[str, str]:
+    """What a folder with an airframe is known by, wherever it lies; by its name alone where it is gone."""
+    try:
+        folder = aircraft.folder(airframe)
+        return {"name": folder.name, "data": content_hash((folder / "airframe.toml").read_bytes())}
+    except OSError:
+        return {"name": Path(airframe).name}
 
 
 def version_of(flight: Flight) -> Version:

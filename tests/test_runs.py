@@ -164,6 +164,63 @@ def test_results_flown_before_a_metric_was_added_have_its_column_without_a_value
     assert results["is_added"].dtype == "boolean"
 
 
+def test_a_value_that_is_listed_twice_is_flown_and_counted_once(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    text = MATRIX.replace("{ uniform = [0.0, 90.0] }", "[0.0, 5, -0.0, 5.0]").replace("count = 5", "count = 1")
+    file = write(tmp_path / "matrix.toml", text + '[[include]]\nplant = "kinematic"\n"start.heading_deg" = -0.0\n')
+    done = invoke("run", file, "--out", out, "--workers", 0, "--log", "none", "--set", "seed=[3, 3]")
+    assert done.exit_code == 0, done.stderr
+    line = text.splitlines().index('"start.heading_deg" = [0.0, 5, -0.0, 5.0]') + 1
+    for place in (f"{file}:{line}: start.heading_deg: lists -0.0", f"{file}:{line}: start.heading_deg: lists 5.0"):
+        assert done.stderr.count(f"warning: {place} more than once; it is flown and counted once\n") == 1
+    assert done.stderr.count("warning: --set seed: lists 3 more than once") == 1
+    assert "1 flight of the matrix the same as another one: flown and counted once" in done.stdout
+    assert done.stdout.splitlines()[-2].startswith("4 flown, 0 earlier, 0 failed")
+    assert len(digests(out)) == 4
+    again = invoke("run", file, "--out", out, "--workers", 0, "--log", "none", "--set", "seed=[3, 3]")
+    assert again.stdout.splitlines()[-2].startswith("0 flown, 4 earlier, 0 failed")
+
+
+def test_a_flight_that_is_there_twice_is_not_compared_as_two() -> None:
+    flights = result_matrix()
+    twice = flights.head(1).assign(key="another", **{"start.heading_deg": flights["start.heading_deg"][0]})
+    with pytest.raises(harness.CompareError, match="2 flights have the same settings as another"):
+        harness.compare(pd.concat([flights, twice], ignore_index=True))
+
+
+def test_a_moved_or_linked_project_with_its_own_airframe_keeps_its_keys(tmp_path: Path) -> None:
+    project, moved, link = tmp_path / "project", tmp_path / "moved", tmp_path / "link"
+    project.mkdir()
+    copied_airframe("aerosonde", project / "mine")
+    text = MATRIX.replace("duration_s", 'aircraft = "mine"\nduration_s').replace("count = 5", "count = 1")
+    write(project / "matrix.toml", text)
+    fly_matrix(project / "matrix.toml", project / "out")
+    before = digests(project / "out")
+    link.symlink_to(project)
+    assert fly_matrix(link / "matrix.toml", project / "out").earlier == len(before) == 2
+    link.unlink()
+    project.rename(moved)
+    assert fly_matrix(moved / "matrix.toml", moved / "out").earlier == 2
+    assert digests(moved / "out") == before
+    data = moved / "mine" / "airframe.toml"
+    data.write_text(data.read_text() + "\n# changed\n")
+    assert fly_matrix(moved / "matrix.toml", moved / "out").done == 2
+
+
+def test_rows_of_another_version_are_marked(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out"
+    fly_matrix(file, out, "seed=0")
+    assert "*" not in invoke("show", out).stdout
+    monkeypatch.setattr("harness.key.PHYSICS_VERSION", 99)
+    fly_matrix(file, out, "seed=1")
+    lines = invoke("show", out).stdout.splitlines()
+    results = harness.load_results(out)
+    for key, seed in zip(results["key"], results["seed"], strict=True):
+        assert any(line.startswith(f"{key[:8]}{'*' if seed == 0 else ' '}") for line in lines)
+    assert lines[-1].startswith("* flown by another version: physics ")
+    assert lines[-1].endswith(" (here 99); the same command flies it anew")
+
+
 def test_a_run_without_a_flight_yet_is_told_in_one_sentence(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
 

@@ -43,6 +43,8 @@ def print_survey(matrix: Matrix, size: Survey, done: int) -> None:
     for key in matrix.draws:
         click.echo(f"  {key}: drawn from the seed")
     of = f"{counted(size.flights - done, 'flight')} to fly" if done else counted(size.flights, "flight")
+    for repeated in matrix.repeated:
+        click.echo(f"warning: {repeated}", err=True)
     for warning in list(size.warnings.values())[:_MOST_WARNINGS]:
         first = "" if warning.alike else " (the numbers are of the first of them)"
         click.echo(f"warning: {warning.flights} of {of}: {warning.text}{first}", err=True)

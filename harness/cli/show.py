@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MOST_LINES = 100
+_MARK = "*"
 
 
 @click.command()
@@ -46,7 +47,7 @@ def show(
     from harness.cli._input import BadInput
     from harness.comparison import chosen as with_settings
     from harness.runs.description import description
-    from harness.runs.recall import row_address
+    from harness.runs.recall import other_versions, row_address
     from harness.runs.results import load_results
     from harness.runs.store import StoreError, find
     from harness.verdict.pairs import CompareError, varying
@@ -62,7 +63,7 @@ def show(
             for line in description(address.folder, stored, varying(load_results(address.folder))):
                 click.echo(line)
             return
-        flights = load_results(row)
+        flights, others = load_results(row), other_versions(Path(row))
         chosen = _sorted(with_settings(flights, wanted(where)), sort)
         named = _named(chosen, columns)
     except (StoreError, CompareError) as error:
@@ -72,8 +73,12 @@ def show(
         table = chosen[named] if columns else chosen
         click.echo(table.head(limit or len(table)).to_csv(index=False), nl=False)
         return
+    marked = chosen["version"].isin([number[:8] for number in others])
+    chosen = chosen.assign(key=chosen["key"].str[:8].where(~marked, chosen["key"].str[:8] + _MARK))
     for line in _table(chosen, named or _usual(flights), limit or _MOST_LINES):
         click.echo(line)
+    if changed := dict.fromkeys(what for names in others.values() for what in names):
+        click.echo(f"{_MARK} flown by another version: {', '.join(changed)}; the same command flies it anew")
     if (more := len(chosen) - (limit or _MOST_LINES)) > 0:
         click.echo(f"... and {more} more; all of them: --limit {len(chosen)}, or --csv")
 
@@ -125,7 +130,7 @@ def _table(flights: pd.DataFrame, columns: Sequence[str], most: int) -> Iterator
         if name in METRICS:
             cells.append([number(_value(value), METRICS[name].scale) for value in values])
         else:
-            cells.append([str(value)[:8] if name == "key" else _cell(value) for value in values])
+            cells.append([_cell(value) for value in values])
     headings = [
         METRICS[name].column_heading.removesuffix("\n% yes") if name in METRICS else name.replace(".", ".\n")
         for name in columns

@@ -26,6 +26,7 @@ class Axis:
     keys: tuple[str, ...]
     values: Sequence[Any]  # with several keys, each is a list of one value per key; a random value is a `Draw`
     lines: Sequence[int]  # the line of each value in the file; the last one stands for all that follow
+    repeated: tuple[tuple[object, int], ...] = ()  # the values that were listed again, each with its line
 
     def __len__(self) -> int:
         return len(self.values)
@@ -55,7 +56,24 @@ class Axis:
         if len(keys) == len(self.keys):
             return self
         kept = [self.choices()[key] for key in keys]
-        return Axis(tuple(keys), kept[0] if len(kept) == 1 else list(zip(*kept, strict=True)), self.lines)
+        return Axis(tuple(keys), kept[0] if len(kept) == 1 else list(zip(*kept, strict=True)), self.lines).once()
+
+    def once(self) -> "Axis":
+        """The axis with each value once."""
+        if isinstance(self.values, range):
+            return self
+        seen, first, again = set[str](), list[int](), list[int]()
+        for i, value in enumerate(self.values):
+            (again if (text := same(value)) in seen else first).append(i)
+            seen.add(text)
+        repeated = tuple((self.values[i], self.line(i)) for i in again)
+        return (
+            replace(
+                self, values=[self.values[i] for i in first], lines=[self.line(i) for i in first], repeated=repeated
+            )
+            if again
+            else self
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +102,13 @@ class Draw:
     def __str__(self) -> str:
         drawn = f"{{ {self.kind} = [{self.a}, {self.b}] }}"
         return drawn if self.length is None else f"{{ speed_mps = {self.length:g}, towards_deg = {drawn} }}"
+
+
+def same(value: object) -> str:
+    """A text that is equal for equal values: of 1 and 1.0, and of 0.0 and -0.0, but not of 1 and true."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(same, value))}]"
+    return repr(float(value) + 0.0 if isinstance(value, int | float) and not isinstance(value, bool) else value)
 
 
 def flattened(table: Mapping[str, object]) -> Iterator[tuple[tuple[str, ...], str, object]]:
@@ -135,7 +160,7 @@ def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -
     if isinstance(value, Mapping):
         if len(keys) > 1:
             raise ValueError("keys that vary together need a list of lists, one value for each key")
-        return Axis(keys, _form(value), [line(0)])
+        return Axis(keys, _form(value), [line(0)]).once()
     if lists and not isinstance(value, list):
         raise ValueError(f"is {shown(value)}, must be {FORMS}")
     values: list[Any] = value if lists and isinstance(value, list) else [value]
@@ -143,11 +168,11 @@ def axis(name: str, value: object, *, lists: bool, line: Callable[[int], int]) -
         raise ValueError("the list is empty, must have at least one value")
     lines = [line(i) for i in range(len(values))]
     if len(keys) == 1:
-        return Axis(keys, [_element(element) for element in values], lines)
+        return Axis(keys, [_element(element) for element in values], lines).once()
     for i, element in enumerate(values):
         if not (isinstance(element, list) and len(element) == len(keys)):
             raise ValueError(f"element {i + 1} is {shown(element)}, must be a list of {len(keys)}: {name}")
-    return Axis(keys, [[_element(of_key) for of_key in element] for element in values], lines)
+    return Axis(keys, [[_element(of_key) for of_key in element] for element in values], lines).once()
 
 
 def _element(value: object) -> object:

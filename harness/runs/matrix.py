@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from harness.flight import Flight
 from harness.key import hashed
-from harness.runs.axis import Axis, Draw, axis, flattened, is_axis
+from harness.runs.axis import Axis, Draw, axis, flattened, is_axis, same
 from harness.settings import Experiment, SettingsError, SettingsFile, flight_from_document, put
 from harness.settings.keys import is_list
 from harness.settings.mended import TOLD
@@ -60,13 +60,22 @@ class Matrix:
         return list(dict.fromkeys(key for block in self.blocks for a in block.axes for key in a.draws))
 
     @property
+    def repeated(self) -> Iterator[str]:
+        """A sentence on each value that is listed more than once."""
+        axes = {id(a): a for block in self.blocks for a in block.axes}  # one of the command line is in every block
+        for a in axes.values():
+            for value, line in a.repeated:
+                place = f"{self.file.path}:{line}: {', '.join(a.keys)}" if line else f"--set {', '.join(a.keys)}"
+                yield f"{place}: lists {shown(value)} more than once; it is flown and counted once"
+
+    @property
     def identifier(self) -> str:
         """A hash of the matrix: where it is equal, equal positions have equal settings."""
         tables = {name: self.file.document.get(name) for name in ("flight", "matrix", "exclude", "include")}
         tables["overrides"] = sorted(".".join(map(str, key)) for key in self.file.overrides)
         if self.given:
             tables["given"] = self.given
-        return hashed({**_plain(tables), "folder": str(self.file.path.parent.absolute())})
+        return hashed({**_plain(tables), "positions": self.positions, "folder": str(self.file.path.parent.absolute())})
 
     def __len__(self) -> int:
         """The number of flights."""
@@ -105,7 +114,7 @@ class Matrix:
         axes: dict[str, set[object]] = {}
         for block in self.blocks:
             for a in block.axes:
-                values = a.values if isinstance(a.values, range) else map(repr, a.values)
+                values = a.values if isinstance(a.values, range) else map(same, a.values)
                 axes.setdefault(", ".join(a.keys), set()).update(values)
         return {keys: len(values) for keys, values in axes.items()}
 

@@ -3,7 +3,7 @@
 import atexit
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,8 +14,8 @@ from harness.key import content_hash, version_of
 from harness.log import FlightLog
 from harness.loop import simulate
 from harness.runs.row import FlightResult, result_of
-from harness.runs.store import Stored, content, find
-from harness.settings import SettingsFile, flight_from_document, overridden, without_former_names
+from harness.runs.store import Stored, content, examples, find, reading
+from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
 
 
 class RowAddress(NamedTuple):
@@ -68,11 +68,41 @@ def recall(place: RowAddress) -> Recalled:
         settings["target"]["track"] = str(_unpacked(place.folder, {name: then["target/track"]}) / name)
     settings["aircraft"] = _airframe(place.folder, settings["aircraft"], then)
     flight = flight_from_document(settings)
-    now = version_of(flight).decides
-    changed = [name for name, digest in then.items() if now["content"].get(name) != digest]
-    changed += [name for name in now["content"] if name not in then]
-    changed += [name for name, value in now.items() if name != "content" and value != stored.version.get(name)]
-    return Recalled(stored, settings, flight, tuple(changed))
+    return Recalled(stored, settings, flight, tuple(_changed(stored.version, version_of(flight).decides)))
+
+
+def other_versions(folder: Path) -> dict[str, list[str]]:
+    """By the number of each version in the store that is not today's: the names of everything that has changed since.
+
+    A file that is gone has changed.
+    """
+    others = {}
+    with reading(folder) as journal:
+        for number, decides, settings in examples(journal):
+            try:
+                now = version_of(flight_from_document(without_former_names(settings))).decides
+            except (SettingsError, OSError) as error:
+                others[number] = [str(error)]
+                continue
+            if changed := list(_changed(decides, now)):
+                others[number] = changed
+    return others
+
+
+def _changed(then: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """The names of what two versions differ in; of libraries and counters with both."""
+    before, after = _by_name(then), _by_name(now)
+    for name in {**before, **after}:
+        if before.get(name) != after.get(name):
+            is_file = name in then["content"] or name in now["content"]
+            yield name if is_file else f"{name} {before.get(name, 'none')} (here {after.get(name, 'none')})"
+
+
+def _by_name(version: Mapping[str, Any]) -> dict[str, object]:
+    flat: dict[str, object] = {}
+    for name, value in version.items():
+        flat |= value if isinstance(value, dict) else {} if value is None else {name: value}
+    return flat
 
 
 class Reflown(NamedTuple):

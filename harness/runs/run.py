@@ -167,7 +167,7 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> Mappi
         return {}
     with reading(folder) as journal:
         current = []
-        for version, settings in examples(journal):
+        for version, _, settings in examples(journal):
             try:
                 now = version_of(flight_from_document(settings))
             except (SettingsError, OSError):

@@ -205,13 +205,13 @@ def state(journal: sqlite3.Connection) -> str:
     return str(text)
 
 
-def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any]]]:
-    """The number of each version in the store, with the settings of one of its flights."""
+def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Of each version in the store its number, what it is a hash of, and the settings of one of its flights."""
     rows = journal.execute(
-        "SELECT v.id, (SELECT settings FROM flights f WHERE f.version = v.id LIMIT 1) AS example FROM versions v "
-        "WHERE example IS NOT NULL"
+        "SELECT v.id, v.decides, (SELECT settings FROM flights f WHERE f.version = v.id LIMIT 1) AS example "
+        "FROM versions v WHERE example IS NOT NULL"
     )
-    return [(version, json.loads(settings)) for version, settings in rows]
+    return [(version, json.loads(decides), json.loads(settings)) for version, decides, settings in rows]
 
 
 def positions(

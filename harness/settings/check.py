@@ -69,7 +69,7 @@ def _type(setting: Setting) -> Any:
     if table := setting.table:
         kind = Annotated[_model(table), AfterValidator(lambda model: _made(table, model))]
     elif setting.kind is float:
-        si = AfterValidator(lambda number: number * setting.unit.si)
+        si = AfterValidator(lambda number: number * setting.unit.si + 0.0)  # -0.0 becomes 0.0
         kind = Annotated[float, Strict(), AllowInfNan(setting.infinite), *setting.bounds, AfterValidator(_sized), si]
         if setting.infinite:  # JSON has no infinity
             kind = Annotated[kind, BeforeValidator(lambda given: math.inf if given == "inf" else given)]

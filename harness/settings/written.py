@@ -33,6 +33,6 @@ def _written_value(value: object, setting: Setting) -> object:
     if setting.table:
         return written(value)
     if setting.kind is float and isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value)  # in Python 100 may stand for 100.0: it is the same flight
+        number = float(value) + 0.0  # in Python 100 may stand for 100.0, and -0.0 for 0.0: it is the same flight
         return "inf" if math.isinf(number) else in_file(number, setting.unit)
     return value

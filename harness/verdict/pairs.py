@@ -113,6 +113,7 @@ def pairs_by(flights: pd.DataFrame, key: str, baseline: object) -> Pairs:
     """
     if len(flights) < 2:
         raise CompareError(f"{len(flights)} flight in all: a comparison takes at least two that differ in {key}")
+    check_unique(flights)
     values = ordered(flights[key])
     others = [column for column in varying(flights) if column not in (key, "seed")]
     instead = f", or compare another setting: --by {others[0]}" if others else ""
@@ -130,6 +131,17 @@ def pairs_by(flights: pd.DataFrame, key: str, baseline: object) -> Pairs:
     if not len(paired):
         raise CompareError(_why_unpaired(judged, key, is_reference) if len(judged) else "every flight failed: no pairs")
     return paired
+
+
+def check_unique(flights: pd.DataFrame) -> None:
+    """Raises `CompareError` when a flight is there twice: a comparison uses each once, that of the baseline too."""
+    columns = [*settings_of(flights), *(column for column in (DIRECTORY,) if column in flights)]
+    if (twice := flights.duplicated(columns, keep=False)).any():
+        first, second, *_ = flights["key"][twice]
+        raise CompareError(
+            f"{int(twice.sum())} flights have the same settings as another, such as {first[:8]} and {second[:8]}; "
+            "a comparison uses each once: fly them again into another directory"
+        )
 
 
 def usual(flights: pd.DataFrame) -> str:
