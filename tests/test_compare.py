@@ -230,11 +230,33 @@ def test_a_browser_shows_all_of_the_page(page: Path, tmp_path: Path) -> None:
     done = opened(page, tmp_path)
     dom = done.stdout
     shown = re.findall(r'<section[^>]* id="(\w+)"', dom)
-    assert shown == ["answer", "flown", "parts", "scorecards", "ladder", "flights", "method"]
-    assert dom.count("<svg") == 5  # a figure for each group of parts, and the waterfalls of two cells
-    assert dom.count("harness view") == 2  # the worst and the middle one
+    assert shown == ["answer", "flown", "flights", "parts", "scorecards", "ladder", "method"]
+    assert dom.count("<svg") == 8  # a curve, two pairs of flights, each group of parts, waterfalls of two cells
+    assert dom.count("harness view") == 4  # the worst and the middle one, at the figure and in the table
     assert "Compared: plant = sixdof beside kinematic" in dom
     assert "CONSOLE" not in done.stderr  # where the browser says what the page's policy forbids
+
+
+def test_tables_sort_and_filter_in_the_browser(page: Path, tmp_path: Path) -> None:
+    text = page.read_text(encoding="utf-8").replace("const LONG = 20;", "const LONG = 2;")
+    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)  # it would forbid the next script
+    asks = """<script>
+      const flown = document.querySelector("table.flown"), plants = () =>
+        [...flown.tBodies[0].rows].filter(row => !row.hidden).map(row => row.cells[1].textContent).join(" ");
+      const told = [];
+      flown.tHead.rows[0].cells[1].click(); told.push(plants());
+      flown.tHead.rows[0].cells[1].click(); told.push(plants());
+      const field = flown.parentElement.previousElementSibling;
+      field.value = "SIXDOF 20"; field.dispatchEvent(new Event("input")); told.push(plants());
+      document.title = told.join(", ");
+    </script></body>"""
+    copy = write(tmp_path / "copy.html", text.replace("</body>", asks))
+    title = re.search(r"<title>([^<]*)</title>", opened(copy, tmp_path / "profile").stdout)
+    assert title
+    up, down, kept = title[1].split(", ")
+    assert up.split() == ["kinematic", "kinematic", "sixdof", "sixdof"]
+    assert down.split() == up.split()[::-1]
+    assert kept == "sixdof"
 
 
 def test_a_browser_fetches_nothing_for_the_page(page: Path, tmp_path: Path) -> None:

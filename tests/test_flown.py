@@ -1,10 +1,11 @@
 """What was flown, line by line and as a map: made-up flights whose counts are known."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from harness.margins import Assess
-from harness.verdict import flown, grid
+from harness.verdict import curve, flown, grid
 from harness.verdict.comparison import Comparison, compare_flights
 from harness.verdict.pairs import CompareError
 from harness.verdict.text import lines
@@ -82,3 +83,19 @@ def test_a_map_is_of_two_numeric_axes() -> None:
         list(lines(comparison, "chatters"))
     with pytest.raises(CompareError, match="did you mean 'chatters'"):
         list(lines(comparison, "chaters"))
+
+
+def test_one_numeric_axis_makes_a_curve_for_each_plant_with_intervals_of_the_means() -> None:
+    flights = result_matrix({"law.k2": [1.0, 4.0, 12.0]})
+    noise = np.random.default_rng(1).normal(size=len(flights))
+    flights["start.heading_deg"] = flights["seed"] + 0.5  # drawn
+    flights["range_error_rms_m"] = flights["law.k2"] + noise
+    (found,) = curve.curves(compare_flights(flights, Assess()))
+    assert (found.axis, set(found.lines)) == ("law.k2", {"kinematic", "sixdof"})
+    for plant, line in found.lines.items():
+        for point in line["range_error_rms_m"]:
+            there = flights[(flights["plant"] == plant) & (flights["law.k2"] == point.x)]
+            assert point.mean == pytest.approx(there["range_error_rms_m"].mean())
+            assert point.low < point.mean < point.high
+            assert set(point.keys) == set(there["key"])
+    assert curve.curves(compare_flights(result_matrix(GAINS), Assess())) == []  # two axes make a map

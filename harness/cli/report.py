@@ -1,11 +1,18 @@
 """`harness report`: a comparison as a page."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from harness.cli._paths import PATH
 from harness.cli._setting import MARGIN, SETTING
+
+if TYPE_CHECKING:
+    from harness.log import FlightLog
+    from harness.verdict.report import ToDraw
 
 
 @click.command()
@@ -52,8 +59,31 @@ def report(
         if not directory.is_dir():
             raise BadInput(f"{directory}: there is no such folder")
     path = writable(markdown or out or directories[-1] / "report.html")
-    with busy("comparing and drawing"):
+    with busy("comparing"):
         comparison, origin = read_comparison(directories, overrides, by, baseline, where)
-        text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin)
+    logs = {} if markdown else _logs(list(job.to_draw(comparison, origin.folder)))
+    with busy("drawing"):
+        text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin, logs)
         write_text(path, text)
     click.echo(f"{path}")
+
+
+def _logs(wanted: list[ToDraw]) -> dict[str, FlightLog]:
+    """The flights by key, read or flown again; without those that are no longer the flights that were compared."""
+    from harness.cli._progress import progress
+    from harness.error import HarnessError
+    from harness.runs.logs import flight_of_row
+
+    logs = {}
+    with progress("reading flights", len(wanted)) as advance:
+        for flight in wanted:
+            try:
+                log = flight_of_row(Path(flight.folder), flight.key, lambda _: None)
+            except (HarnessError, ValueError):
+                log = None
+            if log is not None and log.digest == flight.digest:
+                logs[flight.key] = log
+            else:
+                click.echo(f"{flight.folder}:{flight.key[:12]}: is another flight now, not drawn", err=True)
+            advance()
+    return logs

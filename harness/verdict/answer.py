@@ -17,6 +17,7 @@ from harness.verdict.statistics import Share
 from harness.vocabulary import Verdict
 
 ALIKE = "alike"  # a difference that is shown to lie within its margin
+DEPENDS = "not in every cell, or not the same way"
 CHANGE_HEADINGS = ("metric", "in cells", "largest difference", "margin", "where")
 
 
@@ -205,6 +206,21 @@ def changes(card: Scorecard) -> Iterator[ChangeLine]:
             words = (f"{word} {counts[word]}" for word in (LOWER, HIGHER, ALIKE, Verdict.UNDECIDED) if counts[word])
             found = f"{', '.join(words)} of {len(judgements)}"
         yield ChangeLine(title, found, value(of), margin, place(of.at) if len(judgements) > 1 else "")
+
+
+def change_summary(card: Scorecard) -> Iterator[str]:
+    """A line for each word: the metrics that are lower, higher or alike wherever they were judged; then the others."""
+    by_word: dict[str, list[str]] = {}
+    for column in dict.fromkeys(judgement.column for judgement in card.judgements):
+        words = {_direction(judgement) for judgement in card.of(column)}
+        title = PARTS[column].title if column in PARTS else column
+        if len(words) == 1:
+            by_word.setdefault(next(iter(words)), []).append(title)
+        elif words & {LOWER, HIGHER}:
+            by_word.setdefault(DEPENDS, []).append(title)
+    for word in (LOWER, HIGHER, ALIKE, DEPENDS):
+        if word in by_word:
+            yield f"{word}{' in every cell' if word != DEPENDS else ''}: {', '.join(by_word[word])}"
 
 
 def _direction(judgement: Judgement) -> str:

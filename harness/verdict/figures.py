@@ -9,10 +9,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
+from harness.drawing import COLOURS as LINES
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.verdict.answer import place, plain, signed
 from harness.verdict.comparison import Scorecard
+from harness.verdict.curve import CurveSet
 from harness.verdict.effects import Ladder
+from harness.verdict.flown import TOLD
 from harness.verdict.grid import Grid
 from harness.verdict.pairs import shown
 from harness.verdict.parts import Part
@@ -83,6 +86,31 @@ def _falls(axes: Axes, ladder: Ladder) -> None:
     axes.tick_params(axis="y", labelsize=7)
     if np.isfinite(level) and min(ladder.start, ladder.end) >= 0:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+
+
+def curve_set(figure: Figure, curves: CurveSet) -> None:
+    """Each metric over the numeric axis, a line for each value of what is compared, bars for the intervals."""
+    panels = figure.subplots(1, len(TOLD), squeeze=False)[0]
+    for axes, name in zip(panels, TOLD, strict=True):
+        metric = METRICS[name]
+        for i, (label, line) in enumerate(curves.lines.items()):
+            known = [point for point in line[name] if not math.isnan(point.mean)]
+            colour, marker = LINES[i % len(LINES)], "osD^v"[i % 5]
+            x = [point.x for point in known]
+            axes.plot(
+                x, [metric.scale * p.mean for p in known], marker, ls="-", color=colour, ms=4, lw=1.2, label=label
+            )
+            for point in known:
+                if point.low < point.high:
+                    ends = [metric.scale * point.low, metric.scale * point.high]
+                    axes.plot([point.x, point.x], ends, color=colour, lw=1.0)
+        axes.set_title(f"{metric.heading}\n[{metric.label}]", fontsize=8)
+        axes.set_xlabel(curves.axis, fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.locator_params(axis="x", nbins=5)
+    if any(curves.lines):
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False,
+                      fontsize="small")  # fmt: skip
 
 
 def heat_maps(figure: Figure, grids: Sequence[Grid]) -> None:

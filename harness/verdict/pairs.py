@@ -260,10 +260,10 @@ def cells(pairs: Pairs, across: Iterable[str]) -> list[Cell]:
     for row, text in enumerate(joined(table, columns) if columns else [""] * len(table)):
         rows.setdefault(text, []).append(row)
     known = [np.asarray(indices) for indices in rows.values()]
-    return [Cell({c: table[c].iloc[r[0]] for c in columns}, r, _is_drawn(pairs.other.iloc[r])) for r in known]
+    return [Cell({c: table[c].iloc[r[0]] for c in columns}, r, is_drawn(pairs.other.iloc[r])) for r in known]
 
 
-def _is_drawn(flights: pd.DataFrame) -> bool:
+def is_drawn(flights: pd.DataFrame) -> bool:
     """Whether the seed changes anything: air, noise, or a setting that differs between its flights."""
     noisy = {"wind.turbulence": "none", "estimator.kind": "truth"}
     if any(name in flights and (flights[name] != quiet).any() for name, quiet in noisy.items()):

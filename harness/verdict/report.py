@@ -1,17 +1,23 @@
 """The report: a comparison as one self-contained page."""
 
+import base64
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from harness.drawing import draw
+from harness.log import FlightLog
+from harness.log.figure import paint
 from harness.log.metric import METRICS
 from harness.settings.columns import DIRECTORY
 from harness.settings.written import written
 from harness.tables import number
 from harness.template import template
-from harness.verdict import answer, figures, flown, grid, moved
+from harness.verdict import answer, curve, figures, flown, grid, moved
 from harness.verdict.comparison import Comparison, Scorecard
 from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
 from harness.verdict.pairs import shown, spread
@@ -19,6 +25,9 @@ from harness.verdict.parts import PARTS, Group
 from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
 from harness.vocabulary import SIGNS
 
+SCRIPT = Path(__file__).with_name("report.js").read_text(encoding="utf-8")  # sorts and filters tables
+MOST_DRAWN = 6  # pairs of flights
+MOST_CURVES = 12
 MOST_FLIGHTS = 60  # pairs listed
 MOST_GRIDS = 16
 MOST_LINES = 200  # of what was flown
@@ -52,10 +61,11 @@ class Listed(NamedTuple):
     outcome: str
     keys: tuple[str, str]
     command: str
+    drawing: str  # both flights as an SVG; empty where they are not at hand
 
 
-def page(comparison: Comparison, origin: Origin) -> str:
-    """The HTML page."""
+def page(comparison: Comparison, origin: Origin, logs: Mapping[str, FlightLog] = MappingProxyType({})) -> str:
+    """The HTML page; `logs` by key: flights of `to_draw` that are at hand."""
     added = list(_disturbances(comparison)) if comparison.by == "plant" else []
     judged_parts = [part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)]
     return template("harness.verdict", "report.html.jinja").render(
@@ -78,7 +88,10 @@ def page(comparison: Comparison, origin: Origin) -> str:
         ladders=list(_ladders(comparison)) if comparison.by == "plant" else [],
         disturbances=added[:MOST_DISTURBED],
         more_disturbances=max(0, len(added) - MOST_DISTURBED),
-        listed=list(listed(comparison, origin.folder)),
+        listed=list(listed(comparison, origin.folder, logs)),
+        curves=list(_curves(comparison)),
+        script=SCRIPT,
+        script_hash=base64.b64encode(hashlib.sha256(SCRIPT.encode()).digest()).decode(),
         shown=shown,
         confidence=f"{100 * CONFIDENCE:.0f} %",
         least_seeds=LEAST_SEEDS,
@@ -134,8 +147,36 @@ def _disturbances(comparison: Comparison) -> Iterator[Disturbed]:
     yield from disturbances(comparison.table, (comparison.baseline, comparison.values[-1]))
 
 
-def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
-    """The pairs worth a look: the lost ones, and per airframe and value the worst and the middle settled error."""
+def _curves(comparison: Comparison) -> Iterator[Drawing]:
+    """Metrics over the one numeric axis, if there is one."""
+    found = curve.curves(comparison)
+    for each in found[:MOST_CURVES]:
+        where = answer.place(each.at)
+        yield Drawing(
+            draw(partial(figures.curve_set, curves=each), height=2.8),
+            f"{where}{': ' if where else ''}means over the seeds, with their {100 * CONFIDENCE:.0f} % intervals where "
+            "there are enough seeds.",
+        )
+
+
+class ToDraw(NamedTuple):
+    """A flight that the page draws if it is at hand."""
+
+    folder: str
+    key: str
+    digest: str  # of the log that was compared
+
+
+def to_draw(comparison: Comparison, folder: str) -> Iterator[ToDraw]:
+    """The flights of the middle and the worst pair of each airframe under the value furthest from the baseline."""
+    pairs = comparison.pairs
+    for index in list(_exemplary(comparison))[:MOST_DRAWN]:
+        for row in (pairs.reference.loc[index], pairs.other.loc[index]):
+            yield ToDraw(str(row.get(DIRECTORY, folder)), str(row["key"]), str(row["digest"]))
+
+
+def listed(comparison: Comparison, folder: str, logs: Mapping[str, FlightLog]) -> Iterator[Listed]:
+    """The pairs worth a look: per airframe and value the worst and the middle settled error, and the lost ones."""
     pairs = comparison.pairs
     named = spread(pairs.other)
     columns = [axis for axis in comparison.axes if axis in named and axis != "aircraft"]
@@ -149,7 +190,16 @@ def listed(comparison: Comparison, folder: str) -> Iterator[Listed]:
             str(after["outcome"]),
             keys,
             _to_see(str(before.get(DIRECTORY, folder)), str(after.get(DIRECTORY, folder)), *keys),
+            _side_by_side(
+                {f"{comparison.by} = {shown(row[comparison.by])}": str(row["key"]) for row in (before, after)}, logs
+            ),
         )
+
+
+def _side_by_side(keys: Mapping[str, str], logs: Mapping[str, FlightLog]) -> str:
+    """Ground track and |range error| of two flights by name; empty unless both are at hand."""
+    flights = {name: logs[key] for name, key in keys.items() if key in logs and len(logs[key])}
+    return draw(partial(paint, flights=flights, panels=("track", "error")), height=3.6) if len(flights) == 2 else ""
 
 
 def _to_see(before: str, after: str, first: str, second: str) -> str:
@@ -159,17 +209,29 @@ def _to_see(before: str, after: str, first: str, second: str) -> str:
     return f"harness fly {after}:{second} --against {before}:{first}"
 
 
-def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
-    """Rows of the pairs, and why each was chosen."""
-    chosen: dict[int, list[str]] = {}
+def _exemplary(comparison: Comparison) -> Mapping[int, str]:
+    """The rows of the worst and of the middle pair of each airframe and value, and which it is; the answer's first."""
     other = comparison.pairs.other
     error = comparison.pairs.difference("range_error_rms_m", None)
-    for rows in other.groupby(["aircraft", comparison.by]).groups.values():
-        ranked = sorted((row for row in map(int, rows) if error[row] == error[row]), key=lambda row: error[row])
+    groups = other.groupby([other[comparison.by].map(shown), "aircraft"], sort=False).groups
+    answering = {(card.value, card.aircraft) for card in comparison.answering}
+    chosen: dict[int, str] = {}
+    for place in sorted(groups, key=lambda place: place not in answering):
+        ranked = sorted(
+            (row for row in map(int, groups[place]) if error[row] == error[row]), key=lambda row: error[row]
+        )
         if ranked:
-            worst, middle = ranked[-1], ranked[len(ranked) // 2]
-            chosen.setdefault(worst, []).append(f"settled error worst, {answer.signed(error[worst])} m rms")
-            chosen.setdefault(middle, []).append(f"settled error in the middle, {answer.signed(error[middle])} m rms")
+            middle, worst = ranked[(len(ranked) - 1) // 2], ranked[-1]
+            chosen[middle] = f"settled error in the middle, {answer.signed(error[middle])} m rms"
+            if worst != middle:
+                chosen[worst] = f"settled error worst, {answer.signed(error[worst])} m rms"
+    return chosen
+
+
+def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
+    """Rows of the pairs, and why each was chosen."""
+    chosen = {row: [why] for row, why in _exemplary(comparison).items()}
+    other = comparison.pairs.other
     for row in map(int, other.index[other["lost"] > 0]):
         chosen.setdefault(row, []).append(str(other.loc[row, "reason"]) or "ended early")
     return chosen
