@@ -22,6 +22,9 @@ SLOWEST = 0.2  # Hz: what is slower may be the wind's, round a lap, or the way t
 FEWEST_CYCLES = 12  # in a record: a slower oscillation is not looked for
 SHORTEST = 30.0  # s: a shorter record tells nothing
 _FINER = 8  # times: the spectrum's grid
+_FEWEST_ROWS = 32  # of a record that has a spectrum
+_BINS = 30  # of a spectrum, per decade
+_FEWEST_CROSSINGS = 4  # of the mean
 
 
 class Oscillation(NamedTuple):
@@ -53,6 +56,30 @@ def oscillation(command: Array, flown: Array, period: float) -> Oscillation | No
     correlation = max(_correlation(y, lag) for lag in lags)
     chatters = False if swing < VISIBLE else True if correlation >= LEAST_CORRELATION else None
     return Oscillation(chatters, frequency, amplitude, swing, correlation)
+
+
+def spectrum(command: Array, period: float) -> tuple[Array, Array]:
+    """Frequency, Hz, and amplitude of a record, in its unit; empty of a short one.
+
+    A sinusoid has its own amplitude at its frequency (Hann's window); of each thirtieth of a decade the highest.
+    """
+    if len(command) < _FEWEST_ROWS:
+        return np.empty(0), np.empty(0)
+    window = np.hanning(len(command))
+    amplitude = 2.0 * np.abs(np.fft.rfft((command - command.mean()) * window))[1:] / window.sum()
+    frequency = np.fft.rfftfreq(len(command), period)[1:]
+    begins = np.unique(np.floor(_BINS * np.log10(frequency / frequency[0]) + 1e-9), return_index=True)[1]
+    return np.asarray(frequency[begins], np.float64), np.asarray(np.maximum.reduceat(amplitude, begins), np.float64)
+
+
+def swinging(command: Array, period: float) -> NDArray[np.bool_]:
+    """Row by row, whether the command, rad/s, swings by `VISIBLE`: twice up and down in the 5 s around it, or more."""
+    around = max(2, min(round(1.0 / (SLOWEST * period)), len(command)))
+    padded = np.pad(command, (around // 2, around - 1 - around // 2), mode="edge")
+    parts = np.lib.stride_tricks.sliding_window_view(padded, around)
+    fast = np.sign(parts - parts.mean(axis=1, keepdims=True))
+    crossings = (fast[:, 1:] != fast[:, :-1]).sum(axis=1)
+    return np.asarray((np.ptp(parts, axis=1) >= 2.0 * VISIBLE) & (crossings >= _FEWEST_CROSSINGS), np.bool_)
 
 
 def _without_slow(x: Array, samples: float) -> Array:

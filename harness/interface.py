@@ -76,7 +76,7 @@ def metrics(log: FlightLog) -> dict[str, float | bool | None]:
 def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title: str = "", notes: str = "") -> Path:
     """Writes one flight, or several by name, into a Rerun recording (`.rrd`) and returns its path, whole or not at all.
 
-    Of several the first is the reference, drawn wide and pale under the others. `notes` is Markdown, shown above the
+    Of several the first is the reference; of two it is drawn wide and pale. `notes` is Markdown, shown above the
     results. `harness view PATH` shows it, `read_flight(PATH)` reads it back.
 
     Raises `RecordingError` when it cannot be written, or for more flights than can be told apart; `SettingsError` for a

@@ -14,10 +14,12 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from autopilot.estimator import Estimator
+from autopilot.laws import law
 from harness.flight import MetricSettings
 from harness.log import COLUMNS, FlightLog
 from harness.loop import simulate
 from harness.plants.plant import Outcome
+from harness.review.lanes import lanes_by_flight
 from harness.review.reading import read_logs, read_recording
 from harness.review.recorder import Recorder, clean_up
 from harness.review.recording import write_recording
@@ -261,6 +263,7 @@ def test_a_file_that_breaks_off_leaves_the_old_one_and_nothing_else(kinematic: F
 WRITING = """
 import sys
 from pathlib import Path
+from harness.review.lanes import lanes_by_flight
 from harness.review.reading import read_logs
 from harness.review.recorder import Recorder, clean_up
 from harness.review.recording import write_recording
@@ -309,3 +312,13 @@ def test_recordings_leave_no_threads_behind(kinematic: FlightLog, tmp_path: Path
         write_recording(tmp_path / "a.rrd", {"a": kinematic}, "One")
         counts.append(sum(1 for _ in threads.iterdir()))
     assert counts[-1] <= counts[0]
+
+
+def test_chatter_has_a_lane_that_convergence_does_not_hide() -> None:
+    chattering = simulate(replace(SIXDOF, duration=100.0, law=law("nftsm", "fitted")))
+    entities = {"/circle": "converged", "/chatter": "limit cycle"}
+    found = lanes_by_flight({"sixdof": chattering})
+    assert {entity: found[entity][-1].state for entity in entities} == entities
+    assert list(lanes_by_flight({"a b": chattering, "a=b": chattering})) == [
+        "/circle/a-b", "/chatter/a-b", "/circle/a-b-2", "/chatter/a-b-2",
+    ]  # fmt: skip

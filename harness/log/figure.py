@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from harness.chatter import spectrum as spectrum_of
 from harness.drawing import COLOURS, COLUMN, FAINT, INK, PAGE, Picture
 from harness.drawing import picture as drawn
 from harness.error import ArgumentError, did_you_mean
@@ -29,8 +30,6 @@ MOST = len(COLOURS)  # flights in one figure
 _WIDE, _THIN = 2.0, 0.9  # points: the first flight lies under the others, so it is wider
 _LETTERS, _BESIDE_LETTERS = 18.0, 5  # of a legend: per inch, and as wide as so many is the rest of an entry
 _MOST_BY_ALL = 2  # flights that have all panels unless some are chosen: more would hide each other
-_SHORTEST = 32  # rows: what is shorter has no spectrum
-_BINS = 30  # of the spectrum, per decade
 _LEAST_ERROR = 1e-6  # m: what is smaller is rounding
 
 
@@ -179,19 +178,9 @@ def spectrum(axes: Axes, flights: Flights) -> None:
 
 
 def command_spectrum(signals: Signals) -> tuple[Array, Array]:
-    """Frequency, Hz, and amplitude, deg/s, of the law's command while circling is judged; empty of a short record.
-
-    A sinusoid has its own amplitude at its frequency (Hann's window); of each thirtieth of a decade the highest.
-    """
-    command = signals.circling("heading_rate_command")
-    if len(command) < _SHORTEST:
-        return np.empty(0), np.empty(0)
-    window = np.hanning(len(command))
-    amplitude = 2.0 * np.abs(np.fft.rfft((command - command.mean()) * window)) / window.sum()
-    frequency = np.fft.rfftfreq(len(command), signals.period)[1:]
-    begins = np.unique(np.floor(_BINS * np.log10(frequency / frequency[0]) + 1e-9), return_index=True)[1]
-    highest = np.asarray(np.degrees(np.maximum.reduceat(amplitude[1:], begins)), np.float64)
-    return np.asarray(frequency[begins], np.float64), highest
+    """Frequency, Hz, and amplitude, deg/s, of the law's command while circling is judged; empty of a short record."""
+    frequency, amplitude = spectrum_of(signals.circling("heading_rate_command"), signals.period)
+    return frequency, np.asarray(np.degrees(amplitude), np.float64)
 
 
 class Panel(NamedTuple):

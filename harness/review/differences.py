@@ -17,12 +17,12 @@ _DIFFERENCES = (
 
 
 def difference_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
-    """Plots of flight minus reference, for as long as both last; empty for a single flight.
+    """Plots of flight minus reference, for as long as both last; empty unless there are two flights.
 
     A reference without bank and sideslip is taken as coordinated: bank atan(V heading_rate / g), sideslip 0.
     """
     plots = []
-    for column, title, unit, scale in _DIFFERENCES if len(flights) > 1 else ():
+    for column, title, unit, scale in _DIFFERENCES if len(flights) == 2 else ():
         series = [drawn for flight in flights[1:] if (drawn := finite(_difference(column, scale, flight, flights[0])))]
         if series:
             assumed = ", taken as coordinated" if np.isnan(flights[0].log[column]).all() else ""

@@ -1,6 +1,7 @@
 """Lanes, which show states over time such as "at the limit", and the events of a flight."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
+from harness.chatter import swinging
 from harness.log import FlightLog
 from harness.log.metric import Signals
 from harness.plants.plant import Outcome
@@ -28,6 +30,9 @@ COLOURS: Mapping[str, Colour] = MappingProxyType(
         "free": _SLATE,
         "on and off the limit": _AMBER,
         "at the limit": _RED,
+        "quiet": _SLATE,
+        "swings": _AMBER,
+        "limit cycle": _RED,
         "normal": _SLATE,
         "bank at its limit": _AMBER,
         "beyond the stall angle": _RED,
@@ -59,6 +64,27 @@ class Event(NamedTuple):
     text: str
 
 
+LANES = ("circle", "command", "chatter", "aircraft", "air", "target")
+LANES_OF_SEVERAL = ("circle", "chatter")  # which each of several flights has
+
+
+def lane_entity(lane: str, flight: str = "") -> str:
+    """The entity of a lane. The viewer shows its whole name, so it is of plain words, without escapes."""
+    return f"/{lane}" + (f"/{re.sub('[^0-9A-Za-z_.]+', '-', flight).strip('-')}" if flight else "")
+
+
+def lanes_by_flight(logs: Mapping[str, FlightLog]) -> dict[str, list[Change]]:
+    """The lanes by entity: all of one flight, `LANES_OF_SEVERAL` of more; names that would be one are numbered."""
+    if len(logs) == 1:
+        return {lane_entity(name): changes for name, changes in lanes(*logs.values()).items()}
+    found: dict[str, list[Change]] = {}
+    for number, (name, log) in enumerate(logs.items(), 1):
+        taken = lane_entity(LANES_OF_SEVERAL[0], name) in found
+        for lane, changes in zip(LANES_OF_SEVERAL, (summary(log), chatter_lane(log)), strict=True):
+            found[lane_entity(lane, f"{name}-{number}" if taken else name)] = changes
+    return {entity: changes for entity, changes in found.items() if changes}
+
+
 def lanes(log: FlightLog) -> dict[str, list[Change]]:
     """The lanes of a flight by name, without those that would be empty."""
     if not len(log):
@@ -66,6 +92,7 @@ def lanes(log: FlightLog) -> dict[str, list[Change]]:
     changes_by_lane = {
         "circle": _circle(log),
         "command": command_lane(log),
+        "chatter": chatter_lane(log),
         "aircraft": _aircraft(log),
         "air": _air(log),
         "target": _target(log),
@@ -110,6 +137,17 @@ def command_lane(log: FlightLog) -> list[Change]:
     held = np.abs(log["heading_rate_command"]) < np.abs(log["unlimited_command"])
     shares = [float(part.mean()) for part in _windows(log, held.astype(float))]
     return _lane(log, ["at the limit" if s == 1.0 else "on and off the limit" if s else "free" for s in shares])
+
+
+def chatter_lane(log: FlightLog) -> list[Change]:
+    """Whether the command swings; whether that is a limit cycle, for as long as circling is judged."""
+    if not len(log):
+        return []
+    signals = Signals(log)
+    cycles_from = float(log["time"][signals.window.first]) if signals.limit_cycle else math.inf
+    swings = _windows(log, swinging(log["heading_rate_command"], log.flight.guidance_period).astype(float))
+    named = (("limit cycle" if time >= cycles_from else "swings") for time in log["time"][_begins(log)])
+    return _lane(log, [name if part.mean() >= 0.5 else "quiet" for name, part in zip(named, swings, strict=True)])
 
 
 def _circle(log: FlightLog) -> list[Change]:

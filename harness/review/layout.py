@@ -1,23 +1,33 @@
 """The layout of a recording: its tabs and views, with room for a legend beside the curves of each plot."""
 
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple
 
+import rerun as rr
 import rerun.blueprint as rrb
 
-from harness.review.plots import Plot
+from harness.review.charts import Chart, chart_view
+from harness.review.lanes import LANES_OF_SEVERAL
+from harness.review.plots import DECADES, Plot
 from harness.review.recorder import Recorder
 from harness.review.scene import chase_view, scene_view
-from harness.review.styled import WORDS, StyledFlight
+from harness.review.styled import WORDS, Colour, StyledFlight, is_crowd
 
-_RIGHT = 950.0  # points: width of the column of plots in a window 1600 wide
-_HEIGHT = 870.0  # points: height of all tabs in a window 1000 high
-_LANE, _LANES = 38.0, 52.0  # points: height of a lane, and of the frame around all lanes
+_WIDTH, _HEIGHT = 1600.0, 870.0  # points: all tabs in a window 1600 wide and 1000 high
+_RIGHT = 950.0  # points: width of the column of plots in the overview
+_LANE, _LANES = 40.5, 62.0  # points: height of a lane, and of the frame around all lanes
+_MOST_LANES_WITH_SIDESLIP = 4  # more leave no room for that plot in the overview
 _EVENTS = 190.0  # points: height of the events
+_METRIC, _METRICS = 26.0, 75.0  # points: height of a row of the metrics, and of the rest of them
 _LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of the rest of it
+_DECADES = 190.0  # points: height in which each power of ten has its label
 _ENTRY, _AROUND_LEGEND = 23.5, 70.0  # points: height of a line of a legend, and of the rest of its row
-_AXIS = 35.0  # points: width of the numbers beside a plot
-_MOST_WITH_CHASE = 3  # flights
+_DIGIT, _MINUS, _POINT, _BESIDE_DIGITS = 7.3, 7.0, 2.2, 8.5  # points: widths beside a plot
+_AXIS = 35.0  # points: the usual width of the numbers beside a plot
+_LABEL = 30.0  # points: half of a label below a plot
+_STEPS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s between the labels below plots
+_IN_FRONT_OF: Colour = (72, 72, 72)  # the other flights, where one is in front
 PlayState = Literal["following", "paused"]
 Tab = rrb.Container | rrb.View
 
@@ -30,24 +40,31 @@ class Content(NamedTuple):
     differences: Sequence[Plot]
     aircraft: Sequence[Plot]
     target: Sequence[Plot]
-    lanes: int
+    charts: Sequence[Chart]
+    lanes: Sequence[str]  # entities
     until: float  # s: the end of the time axis of plots over a whole flight
     growing: bool = False  # a flight is shown while it is flown: the range of its values is not known yet
 
+    @property
+    def crowd(self) -> bool:
+        return is_crowd(self.flights)
+
+    def plots(self, *names: str) -> list[Plot]:
+        """Those of the overview with these names, in this order, as far as there are any."""
+        by_name = {plot.name: plot for plot in (*self.overview, *self.aircraft)}
+        return [by_name[name] for name in names if name in by_name]
+
 
 def layout(content: Content) -> rrb.Blueprint:
-    """Five tabs, with the cursor at the start and the panels of the viewer collapsed."""
+    """The tabs, with the cursor at the start and the panels of the viewer collapsed."""
     tabs = [
         _overview(content),
+        *([_circle(content)] if content.charts else []),
         _around_the_cursor(content),
-        _grid(content.aircraft, content, 2 if len(content.flights) == 1 else 3, 1540.0, "Aircraft"),
+        *([_stack_of(content.differences, content, "Differences")] if content.differences else []),
+        _aircraft(content),
         _target(content),
-        rrb.Horizontal(
-            rrb.TextDocumentView(origin="/notes/result", name="Result"),
-            rrb.TextDocumentView(origin="/notes/settings", name="Settings, provenance"),
-            column_shares=(3.0, 2.0),
-            name="Notes",
-        ),
+        _notes(content),
     ]
     play: PlayState = "following" if content.growing else "paused"
     return rrb.Blueprint(
@@ -60,58 +77,102 @@ def layout(content: Content) -> rrb.Blueprint:
 
 
 def _overview(content: Content) -> Tab:
-    """Scene, chase view, events on the left, plots on the right; the lanes of many flights replace the chase view."""
-    flights, plots = content.flights, {plot.name: plot for plot in content.overview}
-    many = len(flights) > _MOST_WITH_CHASE
-    legends = [plot for plot in content.overview if len(flights) == 1 or plot.name == "range_error"]
-    gutter = _gutter(legends, _RIGHT)
-    lanes = rrb.StateTimelineView(
-        origin="/lanes", name="Modes", time_view=_whole_flight(content, 0.02 if many else gutter)
-    )
-    lanes_height = _LANES + _LANE * content.lanes
+    """Scene, metrics and events on the left; on the right the whole flight, or a cell for each of many flights."""
+    flights = content.flights
+    right = "; to the right |error| in powers of ten of 1 m, and heading rate [deg/s]" if content.crowd else ""
+    metrics = rrb.TextDocumentView(origin="/notes/metrics", name=f"Metrics{right}")
+    rows = len(flights) + 1 if content.crowd else 11
+    metrics_height = _METRICS + _METRIC * rows
+    if content.crowd:
+        by_kind = {kind: [lane for lane in content.lanes if lane.startswith(f"/{kind}/")] for kind in LANES_OF_SEVERAL}
+        below: Tab = rrb.Horizontal(*(_lanes(entities, content, kind) for kind, entities in by_kind.items()))
+        height = _LANES + _LANE * len(flights)
+    else:
+        below, height = _event_view(), _EVENTS
+    scene_height = max(250.0, _HEIGHT - metrics_height - height)
+    aspect = (_WIDTH - _RIGHT) / (scene_height - 30.0)
+    left = rrb.Vertical(scene_view(flights, aspect), metrics, below, row_shares=(scene_height, metrics_height, height))
+    plots = _cells(content) if content.crowd else _whole(content)
+    return rrb.Horizontal(left, plots, column_shares=(_WIDTH - _RIGHT, _RIGHT), name="Overview")
 
-    rows: list[Tab] = [_strip(plot, content, gutter) for plot in legends]
-    below: list[Tab] = []
+
+def _whole(content: Content) -> Tab:
+    """The plots of one flight, or of two over each other, above their lanes, with one time axis."""
+    flights = content.flights
+    few = len(content.lanes) <= _MOST_LANES_WITH_SIDESLIP
+    plots = content.plots("range_error", DECADES, "heading_rate", "bank", *(["sideslip"] if few else []))
     if len(flights) > 1:
-        reference = f"; wide and pale: {flights[0].name}, the reference"
-        rows = [_strip(plot._replace(title=plot.title + reference), content, gutter) for plot in legends]
-        rows += [_strip(plots[name], content, gutter, legend=False) for name in ("heading_rate",) if name in plots]
-        rows += _beside([plots[name] for name in ("bank", "sideslip") if name in plots], content)
-        below = _beside(content.differences, content)
-    room = _HEIGHT - (0.0 if many else lanes_height)
-    shares = _heights([_AROUND_LEGEND + _ENTRY * _entries(plot) for plot in legends], len(rows) + len(below), room)
-    if not many:
-        shares.insert(len(rows), lanes_height)
-        rows.append(lanes)
-    right = rrb.Vertical(*rows, *below, row_shares=shares)
+        first = f"{plots[0].title}; wide and pale: {flights[0].name}, the reference"
+        plots[0] = plots[0]._replace(title=first)
+    legends = [plot for plot in plots if len(flights) == 1 or plot.name in ("range_error", DECADES)]
+    gutter = _gutter(legends, _RIGHT)
+    widest = _widest(plots)
+    views = [_strip(plot, content, gutter, _RIGHT, widest, legend=plot in legends) for plot in plots]
+    lanes_height = _LANES + _LANE * len(content.lanes)
+    needed = [_AROUND_LEGEND + _ENTRY * _entries(plot) if plot in legends else 0.0 for plot in plots]
+    needed = [_DECADES if plot.name == DECADES else height for plot, height in zip(plots, needed, strict=True)]
+    shares = [*_heights(needed, _HEIGHT - lanes_height), lanes_height]
+    return rrb.Vertical(*views, _lanes(content.lanes, content, "modes", gutter, _RIGHT, widest), row_shares=shares)
 
-    middle = lanes if many else chase_view(flights[-1], flights)
-    middle_height = lanes_height if many else 250.0
-    left_shares = (_HEIGHT - middle_height - _EVENTS, middle_height, _EVENTS)
-    left = rrb.Vertical(scene_view(flights, 1.45), middle, _event_view(), row_shares=left_shares)
-    return rrb.Horizontal(left, right, column_shares=(2.0, 3.0), name="Overview")
+
+def _cells(content: Content) -> Tab:
+    """A cell for each flight: its error in front of the others', in grey, and its heading rate alone."""
+    columns = 2 if len(content.flights) <= 4 else 3
+    width = _RIGHT / columns
+    error, rate = content.plots(DECADES)[0], content.plots("heading_rate")[0]
+    widest = _widest([error, rate])
+    cells = []
+    for flight in content.flights:
+        views = [
+            _strip(error, content, 0.0, width, widest, legend=False, front=flight, title=flight.name),
+            _strip(rate, content, 0.0, width, widest, legend=False, alone=flight, title="its heading rate [deg/s]"),
+        ]
+        cells.append(rrb.Vertical(*views, row_shares=(3.0, 2.0)))
+    return rrb.Grid(*cells, grid_columns=columns)
+
+
+def _circle(content: Content) -> Tab:
+    first, *others = map(chart_view, content.charts)
+    return rrb.Horizontal(first, rrb.Vertical(*others), name="Circle")
 
 
 def _around_the_cursor(content: Content) -> Tab:
     flights = content.flights
     left = rrb.Vertical(chase_view(flights[-1], flights), scene_view(flights, 1.8), row_shares=(3.0, 2.0))
     axis = rrb.TimeAxis(link="LinkToGlobal")  # Rerun shows 30 s to either side, whatever range is set
-    right = [
-        _view(
-            plot,
-            axis,
-            title=_coloured(plot, flights),
-            legend=False,
-            near=plot.name in ("range_error", "sliding_variable"),
-        )
-        for plot in content.overview
-    ]
+    if content.crowd:
+        (rate,) = content.plots("heading_rate")
+        right = [
+            _view(rate, axis, title=f"{flight.name}: heading rate [deg/s]", legend=False, alone=flight)
+            for flight in flights
+        ]
+    else:
+        right = [
+            _view(
+                plot,
+                axis,
+                title=_coloured(plot, flights),
+                legend=False,
+                near=plot.name in ("range_error", "sliding_variable"),
+            )
+            for plot in content.overview
+            if plot.name != DECADES
+        ]
     return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=(2.0, 3.0), name="Around the cursor, ±30 s")
 
 
-def _event_view() -> rrb.View:
-    columns = rrb.TextLogColumns(timeline_columns=[Recorder.TIMELINE], text_log_columns=["Body"])
-    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+def _aircraft(content: Content) -> Tab:
+    """Two columns of plots with one time axis; of many flights a row for each, with what is alike beside each other."""
+    if not content.crowd:
+        return _stack_of(content.aircraft, content, "Aircraft")
+    plots = content.plots("bank", "sideslip", "airspeed", "altitude")
+    width = _WIDTH / len(plots)
+    views = [
+        _strip(plot, content, 0.0, width, legend=False, alone=flight, title=f"{flight.name}: {plot.title}")
+        for flight in content.flights
+        for plot in plots
+    ]
+    return rrb.Grid(*views, grid_columns=len(plots), name="Aircraft")
 
 
 def _target(content: Content) -> Tab:
@@ -120,36 +181,100 @@ def _target(content: Content) -> Tab:
         left: Tab = scene_view(content.flights, 0.6, "Target and circle")
         plots = [seen, *plots]
     else:
-        below = _strip(seen, content, _gutter([seen], 530.0))
+        below = _strip(seen, content, _gutter([seen], 530.0), 530.0)
         left = rrb.Vertical(scene_view(content.flights, 0.95, "Target and circle"), below, row_shares=(2.0, 1.0))
     right = _grid(plots, content, 2, 1060.0)
     return rrb.Horizontal(left, right, column_shares=(1.0, 2.0), name="Target")
 
 
+def _notes(content: Content) -> Tab:
+    views: list[Tab] = [
+        rrb.TextDocumentView(origin="/notes/result", name="Result"),
+        rrb.TextDocumentView(origin="/notes/settings", name="Settings, provenance"),
+    ]
+    shares = [3.0, 2.0]
+    if content.crowd:  # whose overview has no room for them
+        views.append(_event_view())
+        shares.append(1.5)
+    return rrb.Horizontal(*views, column_shares=shares, name="Notes")
+
+
+def _event_view() -> rrb.View:
+    columns = rrb.TextLogColumns(timeline_columns=[Recorder.TIMELINE], text_log_columns=["Body"])
+    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+
+
+def _lanes(
+    entities: Sequence[str], content: Content, name: str, gutter: float = 0.0, width: float = 320.0, widest: float = 0.0
+) -> rrb.View:
+    return rrb.StateTimelineView(
+        origin="/",
+        contents=list(entities),
+        name=name.capitalize(),
+        time_view=_whole_flight(content, gutter, width, 0.0, widest),
+    )
+
+
+def _stack_of(plots: Sequence[Plot], content: Content, name: str) -> Tab:
+    """All plots over the whole flight, in two columns, each with one time axis."""
+    legend = len(content.flights) == 1
+    return _grid(plots, content, 2, _WIDTH, name, legend=legend)
+
+
 def _grid(
-    plots: Sequence[Plot], content: Content, columns: int, width: float, name: str | None = None
+    plots: Sequence[Plot], content: Content, columns: int, width: float, name: str | None = None, *, legend: bool = True
 ) -> rrb.Container:
-    """A grid of plots with `columns` columns, with legends unless they would only repeat the colours of the flights."""
-    legend = len(content.flights) == 1 or plots is not content.aircraft
-    gutter = _gutter(plots, width / columns) if legend else 0.02
-    views = [_strip(plot, content, gutter, legend=legend) for plot in plots]
+    """A grid of plots whose time axes line up, with legends unless these only repeat colours."""
+    gutter = _gutter(plots, width / columns) if legend else 0.0
+    widest = _widest(plots)
+    views = [_strip(plot, content, gutter, width / columns, widest, legend=legend) for plot in plots]
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def _beside(plots: Sequence[Plot], content: Content) -> list[Tab]:
-    views = [_strip(plot, content, 0.02, legend=False) for plot in plots]
-    return [rrb.Horizontal(*views[i : i + 2]) for i in range(0, len(views), 2)]
-
-
-def _strip(plot: Plot, content: Content, gutter: float, *, legend: bool = True) -> rrb.View:
+def _strip(
+    plot: Plot,
+    content: Content,
+    gutter: float,
+    width: float,
+    widest: float = 0.0,
+    *,
+    legend: bool = True,
+    title: str = "",
+    alone: StyledFlight | None = None,
+    front: StyledFlight | None = None,
+) -> rrb.View:
+    """A plot over the whole flight; see `_view`. `widest` are the numbers beside the plots above and below."""
     near = content.growing and plot.name != "heading_rate"  # its range is known: the limit
-    return _view(plot, _whole_flight(content, gutter), legend=legend, title=plot.title, near=near)
+    beside = widest if near else _beside(plot)
+    axis = _whole_flight(content, gutter, width, beside, max(widest, beside))
+    return _view(plot, axis, legend=legend, title=title or plot.title, near=near, alone=alone, front=front)
 
 
-def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, near: bool = False) -> rrb.View:
-    """One plot. With `near`, its axis follows the values at the times in view."""
+def _view(
+    plot: Plot,
+    axis: rrb.TimeAxis,
+    *,
+    title: str,
+    legend: bool = True,
+    near: bool = False,
+    alone: StyledFlight | None = None,
+    front: StyledFlight | None = None,
+) -> rrb.View:
+    """One plot. With `near`, its axis follows the values at the times in view.
+
+    Of the flights, `alone` leaves out the others, and `front` shows them in grey.
+    """
+    entities = {plot.entity(i): series for i, series in enumerate(plot.series)}
+    contents = [e for e, series in entities.items() if alone is None or series.flight in ("", alone.name)]
+    grey: Mapping[Any, rr.SeriesLines] = {
+        entity: rr.SeriesLines.from_fields(colors=[_IN_FRONT_OF] * len(series.names), widths=[1.0] * len(series.names))
+        for entity, series in entities.items()
+        if front is not None and series.flight not in ("", front.name)
+    }
     return rrb.TimeSeriesView(
-        origin=f"/plots/{plot.name}",
+        origin="/",
+        contents=contents,
+        overrides=grey,
         name=title,
         axis_x=axis,
         axis_y=None if near else rrb.ScalarAxis(range=plot.span),
@@ -157,15 +282,39 @@ def _view(plot: Plot, axis: rrb.TimeAxis, *, title: str, legend: bool = True, ne
     )
 
 
-def _whole_flight(content: Content, gutter: float) -> rrb.TimeAxis:
-    """The time axis of the whole flight; a share `gutter` of the width is left for the legend."""
-    begin, last = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (0.0, content.until / (1.0 - gutter)))
-    return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(begin, last))
+def _whole_flight(content: Content, gutter: float, width: float, beside: float, widest: float) -> rrb.TimeAxis:
+    """The time axis of the whole flight; a share `gutter` of the width is left for the legend.
+
+    `beside` is the width of the numbers beside this plot, `widest` that of the plots it is in line with, points: it
+    begins so much earlier as its curves begin further to the left. It ends just before a label, which would be cut.
+    """
+    needed = content.until / (1.0 - max(gutter, _LABEL / (width - widest)))
+    step = max((step for step in _STEPS if 5.0 * step <= needed), default=_STEPS[0])
+    last = step * (math.ceil(needed / step + 0.02) - 0.02)
+    begin = (beside - widest) / (width - widest) * last
+    both_ends = (rrb.TimeRangeBoundary.absolute(seconds=s) for s in (begin, last))
+    return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(*both_ends))
 
 
-def _heights(legends: Sequence[float], rows: int, room: float) -> list[float]:
+def _widest(plots: Sequence[Plot]) -> float:
+    return max(map(_beside, plots), default=0.0)
+
+
+def _beside(plot: Plot) -> float:
+    """The width of the numbers beside a plot, points. Rerun labels multiples of a power of ten: see `plots.span`."""
+    low, high = plot.span
+    step = 10.0 ** math.floor(math.log10(high - low))
+    if high - low > 7.0 * step:
+        step *= 10.0
+    decimals = max(0, -round(math.log10(step)))
+    texts = [f"{n * step:.{decimals}f}" for n in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    widths = [_DIGIT * sum(map(str.isdigit, text)) + _MINUS * ("-" in text) + _POINT * ("." in text) for text in texts]
+    return _BESIDE_DIGITS + max(widths, default=_DIGIT)
+
+
+def _heights(needed: Sequence[float], room: float) -> list[float]:
     """Heights of the rows: a row whose legend needs more than an equal share gets it, the others share the rest."""
-    tall = [height if height > room / rows else 0.0 for height in [*legends, *[0.0] * (rows - len(legends))]]
+    tall = [height if height > room / len(needed) else 0.0 for height in needed]
     even = (room - sum(tall)) / max(1, tall.count(0.0))
     return [height or even for height in tall]
 

@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 
 from harness.log import FlightLog
-from harness.review.lanes import Change, lanes
+from harness.review.lanes import LANES, Change, lane_entity, lanes
 from harness.review.layout import Content, layout
 from harness.review.plots import Plot
 from harness.review.recorder import Recorder
@@ -65,7 +65,7 @@ class Live:
         new = FlightLog(log.flight, log.outcome, log.reason, log.table[self._sent :])
         if not len(new):
             return
-        content = content_of([flight._replace(log=new)], lanes=2 + bool(np.isfinite(log["angle_of_attack"]).any()))
+        content = content_of([flight._replace(log=new)], [lane_entity(lane) for lane in LANES])
         if not self._sent:
             self._open(flight, content)
         for plot in (*content.overview, *content.aircraft, *content.target):
@@ -88,11 +88,11 @@ class Live:
         log_airframe(self._to, flight, [flight])
         for plot in (*content.overview, *content.aircraft, *content.target):
             for i, series in enumerate(plot.series):
-                log_style(self._to, _entity(plot, i), series)
+                log_style(self._to, plot.entity(i), series)
 
     def _send_plot(self, plot: Plot) -> None:
         for i, series in enumerate(plot.series):
-            log_values(self._to, _entity(plot, i), series)
+            log_values(self._to, plot.entity(i), series)
 
     def _send_lanes(self, log: FlightLog) -> None:
         """Sends the new changes, without those of the last window, which is not complete yet."""
@@ -100,7 +100,7 @@ class Live:
             sent = self._lanes.setdefault(name, {})
             new = [c for c in changes if c.time not in sent and c.time < log["time"][-1] - 1.0]
             sent.update((change.time, change.state) for change in new)
-            log_lane(self._to, name, new)
+            log_lane(self._to, lane_entity(name), new)
 
     def _close_lanes(self, log: FlightLog) -> None:
         """Sends the lanes of the whole flight, which may correct what a parcel sent earlier."""
@@ -108,7 +108,7 @@ class Live:
             times = sorted({change.time for change in changes} | set(self._lanes.get(name, {})))
             since = np.searchsorted([change.time for change in changes], times, side="right") - 1
             final = [Change(at, changes[max(0, i)].state) for at, i in zip(times, since.tolist(), strict=True)]
-            log_lane(self._to, name, final)
+            log_lane(self._to, lane_entity(name), final)
 
     def _flush(self) -> None:
         try:
@@ -118,7 +118,3 @@ class Live:
         except Exception:  # Rerun raises no error of its own
             pass
         self.gone = True
-
-
-def _entity(plot: Plot, i: int) -> str:
-    return f"/plots/{plot.name}/{i:02}"

@@ -9,15 +9,17 @@ from harness.feasibility import feasibility_line, warnings
 from harness.files import as_text
 from harness.key import PHYSICS_VERSION, flight_key
 from harness.log import FlightLog
-from harness.log.metric import METRICS, measure
+from harness.log.metric import METRICS, YES_OR_NO, Metric, Value, measure
 from harness.markup import block
 from harness.markup import markdown as as_markdown
 from harness.provenance import packages
-from harness.review.styled import StyledFlight
+from harness.review.styled import StyledFlight, is_crowd
 from harness.settings import document
 from harness.settings.columns import by_column
 from harness.tables import markdown, number
 
+_FEW = ("convergence_time_s", "range_error_rms_m", "chatters", "limit_cycle_hz")  # of many flights
+_ALSO = ("chatters", "limit_cycle_hz")  # on the first tab, beside those of short tables
 _packages = cache(packages)
 
 
@@ -40,6 +42,31 @@ def result_notes(flights: Sequence[StyledFlight], title: str, above: str, comman
     parts.append(_table([head, *rows]))
     parts += [f"Made by\n\n{block(command)}"] if command else []
     return as_text("\n\n".join(parts))
+
+
+def metric_notes(flights: Sequence[StyledFlight]) -> str:
+    """The metrics that short tables have, beside the outcome: the settled part first seen in numbers."""
+    judged = [measure(flight.log) for flight in flights]
+    usual = [name for name, metric in METRICS.items() if metric.in_short_tables or name in _ALSO]
+    metrics = [METRICS[name] for name in (_FEW if is_crowd(flights) else usual)]
+    metrics = [metric for metric in metrics if any(m[metric.name] is not None for m in judged)]
+    heads = [", ".join(filter(None, (metric.heading, _unit(metric)))) for metric in metrics]
+    cells = [[_cell(metric, m[metric.name]) for metric in metrics] for m in judged]
+    names = [flight.name for flight in flights]
+    ends = [flight.log.outcome.value for flight in flights]
+    if is_crowd(flights):
+        lines = [[name, *row, end] for name, row, end in zip(names, cells, ends, strict=True)]
+        return _table([["", *heads, "ended"], *lines])
+    rows = [[head, *column] for head, column in zip(heads, zip(*cells, strict=True), strict=True)]
+    return _table([["", *names], *rows, ["ended", *ends]])
+
+
+def _unit(metric: Metric) -> str:
+    return "" if metric.unit == YES_OR_NO else "%" if metric.percent else metric.label
+
+
+def _cell(metric: Metric, value: Value) -> str:
+    return number(value, metric.scale if metric.percent and not isinstance(value, bool) else 1.0)
 
 
 def settings_notes(flights: Sequence[StyledFlight]) -> str:

@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.review.styled import GREY, LIGHT, Colour, StyledFlight, mixed
+from harness.review.styled import GREY, LIGHT, Colour, StyledFlight, is_crowd, mixed
 
 Array = NDArray[np.float64]
 
 DEG = 180.0 / math.pi
 _DIM: Colour = (85, 115, 165)
+DECADES = "range_error_decades"  # the plot in which the settled error is seen beside the first
+LEAST_DECADE = -3.0  # 1 mm: a smaller error is drawn as this
 MOST_WITH_COMMANDS = 2  # flights; with more, the commands would hide the flown values
 
 
@@ -25,6 +27,7 @@ class Series(NamedTuple):
     time: Array
     values: Array  # (times, lines)
     variances: Array | None = None  # (times, lines): drawn as a band of one standard deviation to either side
+    flight: str = ""  # whose lines these are; empty for none's
 
 
 class Plot(NamedTuple):
@@ -34,6 +37,10 @@ class Plot(NamedTuple):
     title: str
     series: list[Series]
     span: tuple[float, float]  # the range of values in view
+
+    def entity(self, i: int) -> str:
+        """The entity of one of its series; Rerun draws lines in the order of these names."""
+        return f"/plots/{self.name}/{i:02}"
 
 
 class _Line(NamedTuple):
@@ -52,10 +59,19 @@ class _Content(NamedTuple):
     scale: float
     lines: tuple[_Line, ...]
     least: float = 0.1  # the smallest span of values in view, in the unit of the plot
+    in_decades: bool = False  # the size of the values, in powers of ten of the unit
 
 
 _OVERVIEW = (
     _Content("range_error", "Range error", "m", 1.0, (_Line("range_error", "flown"),)),
+    _Content(
+        DECADES,
+        "|Range error|, powers of ten: 0 is 1 m, -2 is 1 cm",
+        "",
+        1.0,
+        (_Line("range_error", "flown"),),
+        in_decades=True,
+    ),
     _Content(
         "heading_rate",
         "Heading rate",
@@ -112,9 +128,11 @@ def overview_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
 
 
 def aircraft_plots(flights: Sequence[StyledFlight]) -> list[Plot]:
-    """Plots of the aircraft and the air. With several flights, each line that is not zero has its own plot."""
+    """Plots of the aircraft and the air. Of two flights each line that is not zero has its own, of more only few."""
     if len(flights) == 1:
         return [plot for content in _AIRCRAFT if (plot := _plot(content, flights))]
+    if is_crowd(flights):
+        return [plot for content in _AIRCRAFT[:2] if (plot := _plot(content, flights))]
     parts = [part for content in _AIRCRAFT for part in _split(content)]
     plots = [plot for part in parts if (plot := _plot(part, flights))]
     return [plot for plot in plots if any(np.nan_to_num(series.values).any() for series in plot.series)]
@@ -170,6 +188,7 @@ def finite(series: Series) -> Series | None:
         series.time,
         series.values[:, kept],
         None if series.variances is None else series.variances[:, kept],
+        series.flight,
     )
 
 
@@ -187,7 +206,8 @@ def _plot(content: _Content, flights: Sequence[StyledFlight]) -> Plot | None:
     if not flown:
         return None
     series = [*_bounds(content.name, flights), *flown]
-    return Plot(content.name, f"{content.title} [{content.unit}]", series, _span(content, series, flights))
+    title = f"{content.title} [{content.unit}]" if content.unit else content.title
+    return Plot(content.name, title, series, _span(content, series, flights))
 
 
 def _series(content: _Content, flight: StyledFlight, flights: int) -> Series:
@@ -197,7 +217,14 @@ def _series(content: _Content, flight: StyledFlight, flights: int) -> Series:
     colours = tuple(mixed(flight.colour, *shade) for shade in shades)
     widths = (*[1.0 if flight.width < 2.0 else 2.0] * (len(lines) - 1), flight.width)
     values = content.scale * np.column_stack([flight.log[line.column] for line in lines])
-    return Series(tuple(names), colours, widths, flight.log["time"], values)
+    if content.in_decades:
+        values = decades(values)
+    return Series(tuple(names), colours, widths, flight.log["time"], values, flight=flight.name)
+
+
+def decades(values: Array) -> Array:
+    """Powers of ten of the size of values, not below `LEAST_DECADE`."""
+    return np.asarray(np.log10(np.maximum(np.abs(values), 10.0**LEAST_DECADE)), np.float64)
 
 
 def _name(flight: str, line: _Line, lines: Sequence[_Line]) -> str:
@@ -207,6 +234,11 @@ def _name(flight: str, line: _Line, lines: Sequence[_Line]) -> str:
 def _bounds(name: str, flights: Sequence[StyledFlight]) -> list[Series]:
     """Constant lines to compare with the values: tolerance, limit, nominal airspeed, commanded altitude."""
     several = [flight.log.flight for flight in flights]
+    if name == DECADES:
+        return [
+            level(f"tolerance {tolerance:.3g} m", (math.log10(tolerance),), end(flights))
+            for tolerance in sorted({f.metrics.tolerance for f in several})
+        ]
     if name == "range_error":
         label, unit, both, values = "tolerance", "m", True, {f.metrics.tolerance for f in several}
     elif name == "heading_rate":
@@ -227,6 +259,8 @@ def _bounds(name: str, flights: Sequence[StyledFlight]) -> list[Series]:
 
 def _span(content: _Content, series: Sequence[Series], flights: Sequence[StyledFlight]) -> tuple[float, float]:
     """The range of a plot: range errors of the first half are clipped, heading rates are shown up to their limit."""
+    if content.in_decades:
+        return LEAST_DECADE - 0.3, max(_extent(series)[1] + 0.3, 0.5)
     if content.name == "range_error":
         near = max(0.5 * flight.log.flight.law.standoff for flight in flights)
         clipped = [

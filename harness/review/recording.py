@@ -1,6 +1,5 @@
 """Writes flights into a recording: everything is logged to a Rerun stream, then written to a file."""
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,10 +8,11 @@ import rerun as rr
 
 from harness.files import as_text, replacing
 from harness.log import COLUMNS, FlightLog
+from harness.review.charts import charts, log_chart
 from harness.review.differences import difference_plots
-from harness.review.lanes import COLOURS, Change, events, lanes, summary
+from harness.review.lanes import COLOURS, Change, events, lanes, lanes_by_flight
 from harness.review.layout import Content, layout
-from harness.review.notes import flight_json, result_notes, settings_notes
+from harness.review.notes import flight_json, metric_notes, result_notes, settings_notes
 from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
 from harness.review.scene import log_airframe, log_motion, log_surroundings, log_target, log_tracks, log_trail
@@ -26,7 +26,7 @@ Logs = Mapping[str, FlightLog]
 def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command: str = "") -> None:
     """Writes flights by name into one .rrd file with its own layout; the file is complete or absent.
 
-    The first flight is the reference, drawn wide and pale under the others. `notes` is Markdown, shown above the
+    The first flight is the reference; of two it is drawn wide and pale. `notes` is Markdown, shown above the
     results; `command` is shown as the way to repeat the recording. Raises OSError when the file cannot be written,
     ValueError for more flights than `styled.MOST`.
     """
@@ -38,25 +38,25 @@ def write_recording(path: Path, logs: Logs, title: str, notes: str = "", command
         partial.write_bytes(content)
 
 
-def content_of(flights: Sequence[StyledFlight], lanes: int) -> Content:
-    """All plots of these flights, to be laid out beside this number of lanes."""
+def content_of(flights: Sequence[StyledFlight], lanes: Sequence[str]) -> Content:
+    """All plots of these flights, to be laid out beside the lanes of these entities."""
     return Content(
         flights,
         overview_plots(flights),
         difference_plots(flights),
         aircraft_plots(flights),
         target_plots(flights),
+        charts(flights),
         lanes,
         end(flights),
     )
 
 
 def log_series(to: Recorder, plot: Plot) -> None:
-    """Logs the lines of a plot; Rerun draws them in the order of their entities' names."""
+    """Logs the lines of a plot."""
     for i, series in enumerate(plot.series):
-        entity = f"/plots/{plot.name}/{i:02}"
-        log_style(to, entity, series)
-        log_values(to, entity, series)
+        log_style(to, plot.entity(i), series)
+        log_values(to, plot.entity(i), series)
 
 
 def log_style(to: Recorder, entity: str, series: Series) -> None:
@@ -88,26 +88,25 @@ def log_rows(to: Recorder, name: str, rows: FlightLog) -> None:
     to.columns(entity, rows["time"], vectors)
 
 
-def log_lane(to: Recorder, lane: str, changes: Sequence[Change]) -> None:
+def log_lane(to: Recorder, entity: str, changes: Sequence[Change]) -> None:
     """Logs a lane of states, each in its colour."""
-    if not changes:
-        return
-    entity = f"/lanes/{re.sub('[^0-9A-Za-z_.-]+', '_', lane)}"  # the viewer shows this name: no escapes
     to.once(entity, rr.StateConfiguration(values=list(COLOURS), labels=list(COLOURS), colors=list(COLOURS.values())))
     times = np.array([change.time for change in changes])
     to.columns(entity, times, rr.StateChange.columns(state=[change.state for change in changes]))
 
 
 def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: str, command: str) -> None:
-    """Logs what is known once the flights are over: lanes, events, complete tracks, results and settings."""
+    """Logs what is known once the flights are over: lanes, events, tracks, charts, results and settings."""
     several = len(flights) > 1
+    for lane, changes in lanes_by_flight({flight.name: flight.log for flight in flights}).items():
+        log_lane(to, lane, changes)
+    for chart in charts(flights):
+        log_chart(to, chart)
     for i, flight in enumerate(flights):
         entity = to.flight(flight.name)
         to.once(f"{entity}/flight", rr.TextDocument(flight_json(flight.log, i)))
         log_tracks(to, flight, flight.log)
         own_lanes = lanes(flight.log)
-        for name, changes in ({f"{i + 1} {flight.name}": summary(flight.log)} if several else own_lanes).items():
-            log_lane(to, name, changes)
         happened = events(flight.log, own_lanes, shared=i == 0)
         texts = rr.TextLog.columns(
             text=[f"{flight.name}: {event.text}" if several else event.text for event in happened],
@@ -116,6 +115,7 @@ def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: 
         )
         to.columns(rr.new_entity_path(["events", flight.name]), np.array([event.time for event in happened]), texts)
     markdown = rr.MediaType.MARKDOWN
+    to.once("/notes/metrics", rr.TextDocument(metric_notes(flights), media_type=markdown))
     to.once("/notes/result", rr.TextDocument(result_notes(flights, title, notes, command), media_type=markdown))
     to.once("/notes/settings", rr.TextDocument(settings_notes(flights), media_type=markdown))
 
@@ -123,7 +123,7 @@ def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: 
 def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     """The content of the file, made in memory: Rerun's own file sink never returns when the disk is full."""
     flights = styled({as_text(name): log for name, log in logs.items()})
-    content = content_of(flights, len(flights) if len(flights) > 1 else len(lanes(flights[0].log)))
+    content = content_of(flights, list(lanes_by_flight({flight.name: flight.log for flight in flights})))
     to = Recorder()
     memory = to.stream.memory_recording()
     to.stream.set_log_time_enabled(False)

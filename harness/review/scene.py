@@ -129,6 +129,7 @@ def scene_view(flights: Sequence[StyledFlight], aspect: float, name: str = "Scen
         contents=[
             "+ /**",
             "- /plots/**",
+            "- /charts/**",
             "- /ground",
             *(f"- {Recorder.flight(flight.name)}/vehicle/body/near" for flight in flights),
         ],
@@ -148,6 +149,7 @@ def chase_view(flight: StyledFlight, flights: Sequence[StyledFlight]) -> rrb.Spa
         contents=[
             "+ /**",
             "- /plots/**",
+            "- /charts/**",
             "- /target/position/wind/label",
             *(f"- {Recorder.flight(other.name)}/vehicle/body/far" for other in flights),
         ],

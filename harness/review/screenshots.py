@@ -16,7 +16,7 @@ from harness.review.viewer import headless
 from harness.settings import flight_from_document
 
 FOLDER = Path("docs/images")
-TABS = ("overview", "cursor", "aircraft", "target", "notes")
+TABS = ("overview", "circle", "cursor", "aircraft", "target", "notes")
 _SETTLES = 1.0  # s: the viewer first draws, then fetches data that it lacks
 _GREETINGS = 6.0  # s: how long its messages at the start cover a corner
 
@@ -51,7 +51,8 @@ def shoot(viewer: ViewerClient, tab: str, at: float, path: Path) -> None:
     layout = viewer.get_blueprint().blueprint
     containers = [entity["ContainerBlueprint"] for entity in layout.values() if "ContainerBlueprint" in entity]
     (tabs,) = [container for container in containers if container.get("container_kind") == "Tabs"]
-    tabs["active_tab"] = tabs["contents"][TABS.index(tab)]
+    names = TABS if len(tabs["contents"]) == len(TABS) else (*TABS[:3], "differences", *TABS[3:])
+    tabs["active_tab"] = tabs["contents"][names.index(tab)]
     viewer.set_blueprint(layout, of="recording")
     viewer.set_time("sim_time", duration=at, play_state="paused")
     for _ in range(2):

@@ -1,6 +1,6 @@
 """Flights with their style: one name, colour and line width per flight, the same in every view."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ from harness.plants.ladder import rung
 
 Colour = tuple[int, int, int]
 
+_MOST_OVERLAID = 2  # flights in one plot
 MOST = 6  # flights in one recording: the colours of more cannot be told apart
 
 GREY: Colour = (125, 125, 125)
@@ -39,7 +40,7 @@ _WIDE, _THIN = 3.5, 1.5  # points on the screen
 
 
 class StyledFlight(NamedTuple):
-    """A flight with its style. The first of several is the reference, drawn wide and pale under the others."""
+    """A flight with its style. The first of two is the reference, drawn wide and pale under the other."""
 
     name: str
     log: FlightLog
@@ -55,8 +56,13 @@ def styled(logs: Mapping[str, FlightLog]) -> list[StyledFlight]:
     colours = [_RUNGS[rung(plant)] if 0 <= rung(plant) < len(_RUNGS) else _YELLOW for plant in plants]
     if len(set(colours)) < len(colours):
         colours = list(_PALETTE[: len(colours)])
-    widths = [_WIDE if len(logs) > 1 else _THIN, *[_THIN] * (len(logs) - 1)]
+    widths = [_WIDE if len(logs) == 2 else _THIN, *[_THIN] * (len(logs) - 1)]
     return [StyledFlight(*parts) for parts in zip(logs, logs.values(), colours, widths, strict=True)]
+
+
+def is_crowd(flights: Sequence[StyledFlight]) -> bool:
+    """Whether so many flights would hide each other, so that each has plots of its own."""
+    return len(flights) > _MOST_OVERLAID
 
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:
