@@ -70,6 +70,12 @@ def test_six_flights_are_named_by_what_they_differ_in(out: Path, tmp_path: Path)
     assert list(distinctly_named([logs["sixdof paper"]] * 2)) == ["sixdof", "sixdof 2"]
 
 
+def test_without_a_choice_the_flights_are_offered(out: Path) -> None:
+    done = invoke("view", out)
+    assert done.exit_code == 2
+    assert all(key[:8] in done.stdout for key in load_results(out)["key"])
+
+
 def test_a_flight_flown_again_that_is_not_the_stored_one_is_said(out: Path, tmp_path: Path) -> None:
     key = key_of(out, "sixdof", "fitted")
     with sqlite3.connect(out / JOURNAL) as journal:

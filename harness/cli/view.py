@@ -12,6 +12,8 @@ from harness.cli._paths import PATH, PATH_OR_ROW
 if TYPE_CHECKING:
     from harness.log import FlightLog
 
+_MOST_OFFERED = 20  # flights, where none is chosen
+
 
 @click.command()
 @click.argument("what", metavar="[DIR|DIR:KEY|FILE.rrd]", type=PATH_OR_ROW, required=False)
@@ -93,6 +95,9 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
     elif not path.is_dir():
         raise BadInput(f"{what}: no such file or folder")
     elif not flights and pair is None:
+        from harness.cli.show import show
+
+        click.get_current_context().invoke(show, row=what, limit=_MOST_OFFERED)
         raise BadInput(f"{what}: choose flights with --flight KEY or --pair KEY; `harness show {what}` lists the keys")
     if pair is None:
         return distinctly_named(_rows(path, flights))
