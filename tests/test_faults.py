@@ -5,6 +5,7 @@ import ctypes
 import itertools
 import os
 import random
+import shlex
 import shutil
 import signal
 import sqlite3
@@ -247,6 +248,26 @@ def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: P
     assert errors.splitlines()[-1] == "interrupted"
     assert "Traceback" not in errors
     assert len(harness.load_results(tmp_path / "out")) > 0
+
+
+def test_a_run_that_is_terminated_keeps_its_flights_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    process = started(settings(tmp_path, count=500, duration=1000.0), tmp_path / "out")
+    until(lambda: runs_of(tmp_path / "out"), process)
+    process.terminate()
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert "semaphore" not in errors
+    assert "Traceback" not in errors
+    assert ended(process.pid, within=2.0), session(process.pid)
+    assert len(harness.load_results(tmp_path / "out")) > 0
+
+
+@pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
+def test_a_standard_error_that_nobody_can_write_to_loses_no_run(tmp_path: Path, errors: str) -> None:
+    line = shlex.join(words_of(*words(settings(tmp_path, count=4), tmp_path / "out")))
+    done = subprocess.run(["sh", "-c", f"{line} {errors}"], stdout=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 0
+    assert "4 flown, 0 earlier, 0 failed" in done.stdout
 
 
 def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:

@@ -23,8 +23,12 @@ def guard() -> None:
     if (out := sys.stdout) is not None:
         raw = io.BufferedWriter(_Stdout(out.fileno(), "w", closefd=False))
         sys.stdout = io.TextIOWrapper(raw, _encoding(out.encoding), _ANY_TEXT, line_buffering=out.isatty())
-    if isinstance(sys.stderr, io.TextIOWrapper):
-        sys.stderr.reconfigure(encoding=_encoding(sys.stderr.encoding), errors=_ANY_TEXT)
+    if sys.stderr is None:  # closed: the first file that is opened would take its place
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    if sys.stderr is None or isinstance(sys.stderr, io.TextIOWrapper):
+        encoding = "utf-8" if sys.stderr is None else _encoding(sys.stderr.encoding)
+        quiet = io.BufferedWriter(_Stderr(2, "w", closefd=False))
+        sys.stderr = io.TextIOWrapper(quiet, encoding, _ANY_TEXT, line_buffering=True)
 
 
 def _encoding(declared: str) -> str:
@@ -37,6 +41,16 @@ def _encoded(error: UnicodeError) -> tuple[str | bytes, int]:
         return codecs.lookup_error("surrogateescape")(error)
     except UnicodeError:
         return codecs.backslashreplace_errors(error)
+
+
+class _Stderr(io.FileIO):
+    """What cannot be told ends no run."""
+
+    def write(self, content: Any) -> int:
+        try:
+            return super().write(content)
+        except OSError:
+            return len(content)
 
 
 class _Stdout(io.FileIO):

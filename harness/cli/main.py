@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 import warnings
 from collections.abc import Mapping
@@ -102,6 +103,7 @@ def harness() -> None:
 def main() -> None:
     """The entry point."""
     guard()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # in order: what was flown is kept
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     if message := in_the_way():
         click.echo(message, err=True)
