@@ -163,7 +163,7 @@ def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Pa
     unpacked = Path(temporary) / base
     unpacked.mkdir()
     for name, digest in files.items():
-        (unpacked / name).write_bytes(content(folder, digest))
+        (unpacked / Path(name).name).write_bytes(content(folder, digest))  # a name of somebody else leads nowhere else
     return unpacked
 
 
