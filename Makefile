@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence notebook verdict bench clean
+.PHONY: demo test install docs models identify paper lock turbulence notebook verdict bench fuzz clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -57,6 +57,9 @@ bench: install  ## the speed of the loop, as ratios in one run, of --help, of re
 	$(BIN)/python -m benchmarks.help_speed
 	$(BIN)/python -m benchmarks.recording_speed
 	$(BIN)/python -m benchmarks.runs
+
+fuzz: install  ## the command line with 2000 inputs that nobody meant, at random (a quarter of an hour)
+	FUZZ=2000 $(BIN)/pytest tests/test_fuzz.py
 
 lock:  ## resolve the dependencies, keeping the pins that still serve (needs uv); UPGRADE=--upgrade moves them all
 	uv pip compile pyproject.toml --extra dev --generate-hashes --universal --python-version 3.11 \

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import click
 
+from harness.cli._input import BadInput
 from harness.cli._stdout import guard
+from harness.error import HarnessError
 from harness.neighbours import in_the_way
 
 
@@ -71,6 +73,12 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name, known, rest = super().resolve_command(ctx, args)
         return name, known and load(args[0]), rest
+
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except HarnessError as error:  # what was given cannot be used, wherever that was found
+            raise BadInput(str(error)) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         width = max(map(len, self.commands))

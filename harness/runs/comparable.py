@@ -1,7 +1,7 @@
 """The flights of one run, or of several, that may be compared, and the margins that judge them."""
 
-import shlex
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -64,7 +64,7 @@ def _asked(folder: Path, overrides: Sequence[str]) -> tuple[str, Assess]:
     """The question and the margins that the settings and the command line of the last run say."""
     of = last_run(folder)
     where = Path(f"{folder} (its copy of {of['file']})")
-    assess = settings_from_text(of["settings"], where, [*_given(of["command"]), *overrides]).assess()
+    assess = settings_from_text(of["settings"], where, [*_given(of["words"]), *overrides]).assess()
     return str(of["question"] or ""), assess
 
 
@@ -81,10 +81,9 @@ def _refuse_mixed(of: dict[str, dict[str, int]], place: str) -> None:
         )
 
 
-def _given(command: str) -> Iterator[str]:
-    """The margins that a command line set."""
-    words = shlex.split(command)
-    for i, word in enumerate(words):
-        text = word.removeprefix("--set=") if word.startswith("--set=") else words[i + 1] if word == "--set" else ""
+def _given(words: Sequence[str]) -> Iterator[str]:
+    """The margins that the words of a command set."""
+    for word, following in pairwise([*words, ""]):
+        text = word.removeprefix("--set=") if word.startswith("--set=") else following if word == "--set" else ""
         if text.strip().startswith("assess."):
             yield text

@@ -14,7 +14,7 @@ from harness.key import content_hash, version_of
 from harness.log import FlightLog
 from harness.loop import simulate
 from harness.runs.row import FlightResult, result_of
-from harness.runs.store import Stored, content, examples, find, reading
+from harness.runs.store import Stored, StoreError, content, examples, find, reading
 from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
 
 
@@ -62,12 +62,17 @@ def recall(place: RowAddress) -> Recalled:
     stored = find(*place)
     settings = without_former_names(stored.row["flight"])  # a copy
     then: Mapping[str, str] = stored.version["content"]
-    track = settings["target"]["track"]
-    if track is not None and _hash(Path(track)) != then["target/track"]:
-        name = Path(track).name
-        settings["target"]["track"] = str(_unpacked(place.folder, {name: then["target/track"]}) / name)
-    settings["aircraft"] = _airframe(place.folder, settings["aircraft"], then)
-    flight = flight_from_document(settings)
+    match settings:
+        case {"target": {"track": str(track)}} if _hash(Path(track)) != then.get("target/track"):
+            name = Path(track).name
+            settings["target"]["track"] = str(_unpacked(place.folder, {name: then.get("target/track", "")}) / name)
+    match settings:
+        case {"aircraft": str(name)}:
+            settings["aircraft"] = _airframe(place.folder, name, then)
+    try:
+        flight = flight_from_document(settings)
+    except SettingsError as error:
+        raise StoreError(f"{place.folder}: the flight {stored.row['key']} cannot be flown again: {error}") from None
     return Recalled(stored, settings, flight, tuple(_changed(stored.version, version_of(flight).decides)))
 
 

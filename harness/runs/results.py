@@ -168,16 +168,16 @@ def versions(folder: Path) -> dict[str, dict[str, int]]:
         groups = journal.execute(
             "SELECT v.decides, json_extract(f.settings, '$.aircraft'), json_extract(f.settings, '$.target.track'), "
             "count(*) FROM flights f JOIN versions v ON v.id = f.version GROUP BY 1, 2, 3"
-        ).fetchall()
-    for decides, airframe, track, count in groups:
-        version = json.loads(decides)
-        for what, which in (*version.pop("content").items(), *version.items()):
-            if which is None:
-                continue
-            if what.startswith("aircraft/"):
-                what = f"{what} of {airframe}"
-            elif what == "target/track":
-                what = f"the track {track}"
-            of = counts.setdefault(what, {})
-            of[str(which)] = of.get(str(which), 0) + count
+        )
+        for decides, airframe, track, count in groups:
+            version = json.loads(decides)
+            for what, which in (*version.pop("content").items(), *version.items()):
+                if which is None:
+                    continue
+                if what.startswith("aircraft/"):
+                    what = f"{what} of {airframe}"
+                elif what == "target/track":
+                    what = f"the track {track}"
+                of = counts.setdefault(what, {})
+                of[str(which)] = of.get(str(which), 0) + count
     return counts

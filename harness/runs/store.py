@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import socket
 import sqlite3
 import time
@@ -17,6 +18,7 @@ from harness.key import Version, content_hash
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
 from harness.runs.row import FlightResult, FlightRow
+from harness.toml_text import shortened
 
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
 COMMIT_EVERY = 0.5  # s: the longest time that a row waits to be committed
@@ -181,7 +183,7 @@ class Store:
 def reading(folder: Path) -> Iterator[sqlite3.Connection]:
     """The journal, open for reading, also while a run writes to it; one of an earlier format as an upgraded copy.
 
-    Raises `StoreError`.
+    Raises `StoreError`; also where what is done with it fails, since that is to take its rows apart.
     """
     path = folder / JOURNAL
     if not path.is_file():
@@ -196,7 +198,13 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
             if version != _FORMAT:
                 journal.backup(copy)
                 _upgrade(copy, version)
-            yield journal if version == _FORMAT else copy
+            try:
+                yield journal if version == _FORMAT else copy
+            except HarnessError:
+                raise
+            except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+                what = f"{type(error).__name__}: {shortened(str(error))}"
+                raise StoreError(f"{path}: is damaged: a row cannot be read ({what}); move it away") from error
 
 
 def state(journal: sqlite3.Connection) -> str:
@@ -251,26 +259,47 @@ def find(folder: Path, beginning: str) -> Stored:
             raise StoreError(f"{folder}: the key {beginning!r} is ambiguous: {keys}")
         kept = dict(rows[0])
         run = dict(journal.execute("SELECT * FROM runs WHERE id = ?", (kept["run"],)).fetchone())
-    row = {
-        "key": kept["key"],
-        "outcome": kept["outcome"],
-        "reason": kept["reason"],
-        "digest": kept["digest"],
-        "flight": json.loads(kept["settings"]),
-        "metrics": json.loads(kept["metrics"]),
-        "feasibility_margin_deg_s": kept["feasibility_margin_deg_s"],
-    }
-    return Stored(row, json.loads(kept["final"]), kept["seconds"], json.loads(kept["decides"]), run)
+        row = {
+            "key": kept["key"],
+            "outcome": Outcome(kept["outcome"]).value,
+            "reason": kept["reason"],
+            "digest": kept["digest"],
+            "flight": _table(kept["settings"]),
+            "metrics": _numbers(kept["metrics"]),
+            "feasibility_margin_deg_s": kept["feasibility_margin_deg_s"],
+        }
+        version = _table(kept["decides"])
+        if not isinstance(version["content"], dict):
+            raise TypeError("the version of a flight has no files")
+        return Stored(row, _numbers(kept["final"]), kept["seconds"], version, run)
+
+
+def _table(text: str) -> dict[str, Any]:
+    """A table that is kept as JSON."""
+    table = json.loads(text)
+    if not isinstance(table, dict):
+        raise TypeError(f"{shortened(text)} is no table")
+    return table
+
+
+def _numbers(text: str) -> dict[str, Any]:
+    """Numbers by name that are kept as JSON; some may be yes, no or none."""
+    table = _table(text)
+    if wrong := [name for name, value in table.items() if not isinstance(value, float | int | None)]:
+        raise TypeError(f"{wrong[0]} is no number")
+    return table
 
 
 def last_run(folder: Path) -> Mapping[str, Any]:
-    """The provenance of the latest run in this directory, and when that ended. Raises `StoreError`."""
+    """The provenance of the latest run here, when that ended, and the `words` of its command. Raises `StoreError`."""
     with reading(folder) as journal:
         journal.row_factory = sqlite3.Row
         latest = journal.execute("SELECT * FROM runs ORDER BY id DESC LIMIT 1").fetchone()
-    if latest is None:
-        raise StoreError(f"{folder}: no run has begun here")
-    return dict(latest)
+        if latest is None:
+            raise StoreError(f"{folder}: no run has begun here")
+        if not isinstance(latest["settings"], str):
+            raise TypeError("the settings of the latest run are no text")
+        return {**dict(latest), "words": shlex.split(str(latest["command"]))}
 
 
 def on_each_plant(folder: Path, settings: Mapping[str, Any]) -> dict[str, str]:
