@@ -1,18 +1,25 @@
 """Provenance: the command, code, packages and machine that made results."""
 
+import hashlib
 import json
+import math
 import platform
 import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 _HERE = Path(__file__).parent.parent
 DISTRIBUTION = "standoff-harness"
+_FLYING = ("jsbsim", "numpy", "scipy", "filterpy")  # the libraries that fly
 
 
 class Provenance(NamedTuple):
@@ -30,6 +37,7 @@ class Provenance(NamedTuple):
     packages: str  # JSON: versions by name
     platform: str
     python: str
+    processor: str | None  # see `processor`; None in journals that did not keep it
 
 
 def provenance(file: Path, text: str, title: str, question: str) -> Provenance:
@@ -48,6 +56,7 @@ def provenance(file: Path, text: str, title: str, question: str) -> Provenance:
         json.dumps(packages()),
         platform.platform(),
         platform.python_version(),
+        processor(),
     )
 
 
@@ -56,10 +65,14 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
+def requirements() -> list[str]:
+    """The packages that the harness requires, as `numpy>=2.2`."""
+    return [requirement for requirement in requires(DISTRIBUTION) or () if "extra ==" not in requirement]
+
+
 def packages() -> dict[str, str]:
     """The versions of the harness and of the libraries that it requires, by name."""
-    asked = [requirement for requirement in requires(DISTRIBUTION) or () if "extra ==" not in requirement]
-    names = [DISTRIBUTION, *(re.split(r"[^\w.-]", requirement)[0] for requirement in asked)]
+    names = [DISTRIBUTION, *(re.split(r"[^\w.-]", requirement)[0] for requirement in requirements())]
     versions = {}
     for name in names:
         try:
@@ -67,6 +80,44 @@ def packages() -> dict[str, str]:
         except PackageNotFoundError:
             versions[name] = "not installed"
     return versions
+
+
+@cache
+def processor() -> str:
+    """The kind of processor, and a hash of what it makes of some arithmetic.
+
+    Mathematical functions and matrix products choose their instructions by the processor, and differ in last bits.
+    """
+    x = [0.0137 * k for k in range(1, 1001)]  # of a hundred numbers too few differ
+    functions = (math.sin, math.cos, math.atan, math.exp, math.log)
+    made = [f(v) for f in functions for v in x] + [math.atan2(v, 1.7 - v) for v in x] + [v**0.667 for v in x]
+    A = np.sin(np.array(x[:144])).reshape(12, 12)
+    product = A @ A.T + 12.0 * np.eye(12)
+    matrices = np.stack([product, np.linalg.solve(product, A), np.linalg.cholesky(product)])
+    digest = hashlib.blake2b(np.array(made).tobytes() + matrices.tobytes(), digest_size=4).hexdigest()
+    return f"{platform.machine()} (arithmetic {digest})"
+
+
+def decides_bits() -> dict[str, str]:
+    """What decides the last bits of a flight beside code and settings, here: where all is equal, all bits are."""
+    return _decides_bits(processor(), platform.python_version(), packages())
+
+
+def decided_bits(run: Mapping[str, Any]) -> dict[str, str]:
+    """The same of an earlier run, as far as it was kept, from its `Provenance` as a row of the journal."""
+    return _decides_bits(run["processor"], run["python"], json.loads(run["packages"]))
+
+
+def _decides_bits(processor: str | None, python: str, packages: Mapping[str, str]) -> dict[str, str]:
+    known = {name: packages[name] for name in _FLYING if name in packages}
+    return {**({"processor": processor} if processor else {}), "Python": python.rpartition(".")[0], **known}
+
+
+def differences(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
+    """What decides the last bits and is not as it was, in words; what is not known of both counts as equal."""
+    for name in then:
+        if name in now and now[name] != then[name]:
+            yield f"{name} {then[name]} there, {now[name]} here"
 
 
 def _git(*words: str) -> str | None:

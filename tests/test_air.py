@@ -9,7 +9,7 @@ import pytest
 import aircraft
 from autopilot.laws import law
 from harness.checks import problems
-from harness.doctor import wind_triangle_error
+from harness.doctor.self_tests import wind_triangle_error
 from harness.flight import Flight, air_of
 from harness.loop import observe, simulate
 from harness.plants.kinematic import Kinematic

@@ -1,23 +1,16 @@
 """Thirty flights of all plants, laws, airframes and airs: none may move by a bit unless the CHANGELOG says so.
 
-`python -m tests.test_digests` writes `digests.json` anew.
+`python -m tests.test_digests` writes anew what of them is stored with the package, for `harness doctor`.
 """
 
 import json
-import platform
 from collections.abc import Iterator, Mapping
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-import harness
-from harness.settings import flight_from_document
-
-STORED = Path(__file__).parent / "digests.json"
-SHOWN = ("north", "east", "altitude", "heading", "airspeed", "range_error")  # of the last row
-SI_TOLERANCE = 1e-5  # of the last row, on another kind of machine
+from harness.doctor.stored_flights import STORED, TOLERANCE, flown, moved, stored
+from harness.provenance import decides_bits
 
 AIRFRAMES = {"ultra_stick_25e": 13.0, "skywalker_x8": 13.0, "aerosonde": 25.0}
 LAWS: Mapping[str, Mapping[str, Any]] = {
@@ -69,37 +62,27 @@ def one(plant: str, airframe: str, law: str, air: str, **others: Any) -> tuple[s
     return ", ".join([plant, airframe, law, air, *others]), flight
 
 
-def flown(flight: Mapping[str, Any]) -> dict[str, Any]:
-    log = harness.simulate(flight_from_document(flight))
-    last = {name: float(log[name][-1]) for name in SHOWN}
-    return {"digest": log.digest, "outcome": log.outcome.value, "rows": len(log), "last": last}
-
-
-def machine() -> dict[str, str]:
-    """What decides the last bits beside the code: equal here, equal bits."""
-    return {"machine": platform.machine(), **{name: version(name) for name in ("jsbsim", "numpy", "scipy", "filterpy")}}
-
-
 FLIGHTS = dict(flights())
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_flight_of_all_plants_laws_and_airs_is_as_it_was_stored(name: str) -> None:
-    stored = json.loads(STORED.read_text(encoding="utf-8"))
-    then, now = stored["flights"][name], flown(FLIGHTS[name])
-    assert now["outcome"] == then["outcome"] == "completed"
-    assert now["rows"] == then["rows"]
-    assert now["last"] == pytest.approx(then["last"], rel=SI_TOLERANCE, abs=SI_TOLERANCE)
-    if machine() == stored["machine"]:
-        assert now["digest"] == then["digest"]
+    bits, stored_flights = stored()
+    then = stored_flights[name]
+    assert then.flight == FLIGHTS[name]
+    assert then.outcome == "completed"
+    if found := moved(then, flown(FLIGHTS[name])):
+        assert bits != decides_bits(), found
+        assert found.relative <= TOLERANCE, found
 
 
 def test_thirty_flights_are_stored_and_no_two_are_the_same() -> None:
-    stored = json.loads(STORED.read_text(encoding="utf-8"))["flights"]
-    assert set(stored) == set(FLIGHTS)
-    assert len({flight["digest"] for flight in stored.values()}) == len(FLIGHTS) >= 30
+    _, flights = stored()
+    assert set(flights) == set(FLIGHTS)
+    assert len({flight.digest for flight in flights.values()}) == len(FLIGHTS) >= 30
 
 
 if __name__ == "__main__":
-    text = json.dumps({"machine": machine(), "flights": {n: flown(f) for n, f in FLIGHTS.items()}}, indent=1)
-    STORED.write_text(text + "\n", encoding="utf-8")
+    lines = [f"{json.dumps(name)}: {json.dumps(flown(flight)._asdict())}" for name, flight in FLIGHTS.items()]
+    text = ",\n".join(lines)
+    STORED.write_text(f'{{"bits": {json.dumps(decides_bits())},\n"flights": {{\n{text}\n}}}}\n', encoding="utf-8")

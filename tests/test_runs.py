@@ -108,7 +108,8 @@ def test_a_journal_of_an_earlier_format_is_read_as_it_is_and_upgraded_by_the_nex
     results = harness.load_results(out)
     with contextlib.closing(sqlite3.connect(out / JOURNAL)) as journal:  # what format 1 had in place of the state
         journal.executescript(
-            "DROP TABLE state; CREATE TABLE changes (number INTEGER NOT NULL); INSERT INTO changes VALUES (1); "
+            "ALTER TABLE runs DROP COLUMN processor; DROP TABLE state; "
+            "CREATE TABLE changes (number INTEGER NOT NULL); INSERT INTO changes VALUES (1); "
             "PRAGMA user_version = 1;"
         )
     before = (out / JOURNAL).read_bytes()
@@ -116,6 +117,19 @@ def test_a_journal_of_an_earlier_format_is_read_as_it_is_and_upgraded_by_the_nex
     assert (out / JOURNAL).read_bytes() == before
     assert fly_matrix(file, out).earlier == len(results)
     pd.testing.assert_frame_equal(harness.load_results(out), results)
+
+
+def test_a_run_where_others_were_flown_with_another_library_or_processor_warns_once(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    fly_matrix(file, out, "seed=0")
+    with contextlib.closing(sqlite3.connect(out / JOURNAL)) as journal:
+        journal.execute("UPDATE runs SET packages = json_set(packages, '$.numpy', '2.2.0'), processor = 'arm64 (a)'")
+        journal.commit()
+    told = r"flown elsewhere \(processor arm64 \(a\) there, .* here; numpy 2\.2\.0 there, .* here\).*`harness doctor`"
+    with pytest.warns(UserWarning, match=told) as warned:
+        assert fly_matrix(file, out, "seed=1").earlier == 0
+    assert len(warned) == 1
+    fly_matrix(file, out, "seed=2")
 
 
 def test_a_journal_of_a_later_format_is_refused_with_what_to_do(file: Path, tmp_path: Path) -> None:

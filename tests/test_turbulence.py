@@ -14,7 +14,7 @@ from scipy.signal import welch
 import aircraft
 from autopilot.laws import law
 from harness.checks import problems
-from harness.doctor import wind_triangle_error
+from harness.doctor.self_tests import wind_triangle_error
 from harness.flight import Flight, air_of
 from harness.loop import simulate
 from harness.plants.plant import End, Outcome, Start

@@ -49,7 +49,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
         "Airframes and installation": {
             "list": Entry("list:list_", "List the laws, aircraft, plants, metrics, margins or settings."),
             "identify": Entry("identify:identify", "Identify how an airframe follows a heading-rate command."),
-            "doctor": Entry("doctor:doctor", "Check this installation: versions, wind and units."),
+            "doctor": Entry("doctor:doctor", "Check this installation: packages, wind, units and the bits of flights."),
         },
     }
 )

@@ -33,6 +33,11 @@ def quiet() -> dict[str, str]:
     return {**os.environ, "CI": "1"}
 
 
+def has_display() -> bool:
+    """Whether a window can be opened here, as far as the environment tells."""
+    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
 def listening(port: int) -> bool:
     """Whether something listens on the port; answered at once, while Rerun itself would wait for 5 s."""
     try:
@@ -52,7 +57,7 @@ def show(path: Path | None, port: int = PORT) -> None:
 
     If another viewer has the port, the window uses a free one: Rerun would send the recording to the other viewer.
     """
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not has_display():
         raise ViewerError("there is no display here: write a file with --save, and open it where there is one")
     if listening(port):
         if path is None:

@@ -1,6 +1,7 @@
 """A run: flies the flights of a matrix that are not done yet and keeps their rows in a store."""
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import NamedTuple
 
 from harness.key import Identity, files, identity, version_of
 from harness.plants.plant import Outcome
-from harness.provenance import provenance
+from harness.provenance import decided_bits, decides_bits, differences, provenance
 from harness.runs.matrix import Matrix
 from harness.runs.recordings import lacks_recording, recording_path
 from harness.runs.row import row
@@ -59,6 +60,7 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
     if matrix.mistakes:
         raise SettingsError(matrix.mistakes)
     with Store(folder) as store:
+        _warn_of_flights_from_elsewhere(store)
         experiment = matrix.experiment
         store.begin(provenance(matrix.file.path, matrix.file.text, experiment.title, experiment.question))
         count = len(matrix)
@@ -83,6 +85,17 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
             flying.close()
         store.end()
         yield progress
+
+
+def _warn_of_flights_from_elsewhere(store: Store) -> None:
+    """Once: the run that begins now is the latest the next time."""
+    earlier = store.latest_run()
+    if earlier and (apart := list(differences(decided_bits(earlier), decides_bits()))):
+        warnings.warn(
+            f"{store.folder}: its flights were flown elsewhere ({'; '.join(apart)}), and those flown here may differ "
+            "from them in the last bits: `harness doctor` says by how much",
+            stacklevel=1,
+        )
 
 
 class _Pending(NamedTuple):

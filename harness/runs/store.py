@@ -23,7 +23,7 @@ from harness.toml_text import shortened
 JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
 COMMIT_EVERY = 0.5  # s: the longest time that a row waits to be committed
 _APPLICATION = 0x53544F46  # "STOF", SQLite's application id of the journal
-_FORMAT = 2  # of the journal, in SQLite's user_version
+_FORMAT = 3  # of the journal, in SQLite's user_version
 _RANDOM = "lower(hex(randomblob(16)))"
 _WAIT = 60.0  # s, for another process to let go of the journal
 
@@ -47,6 +47,7 @@ PRAGMA application_id = {_APPLICATION};
 """
 _UPGRADES = {  # by format, what makes the next one of it
     1: f"DROP TABLE changes; CREATE TABLE state (id TEXT NOT NULL); INSERT INTO state VALUES ({_RANDOM});",
+    2: "ALTER TABLE runs ADD COLUMN processor;",
 }
 
 
@@ -104,10 +105,16 @@ class Store:
 
     def begin(self, provenance: Provenance) -> None:
         """Begins a run: all rows added from now on belong to it."""
-        values = ", ".join("?" * len(provenance))
-        self._change(f"INSERT INTO runs VALUES (NULL, {values}, NULL)", provenance)
+        names, values = ", ".join(Provenance._fields), ", ".join("?" * len(provenance))
+        self._change(f"INSERT INTO runs ({names}) VALUES ({values})", provenance)
         ((self._run,),) = self._all("SELECT max(id) FROM runs")
         self.commit()
+
+    def latest_run(self) -> Mapping[str, Any] | None:
+        """The provenance of the latest run; None without any flight."""
+        with _store_errors(self.folder):
+            flown = self._journal.execute("SELECT 1 FROM flights LIMIT 1").fetchone()
+            return _latest_run(self._journal) if flown else None
 
     def end(self) -> None:
         """Ends the run, whether all its flights are done or not."""
@@ -293,13 +300,19 @@ def _numbers(text: str) -> dict[str, Any]:
 def last_run(folder: Path) -> Mapping[str, Any]:
     """The provenance of the latest run here, when that ended, and the `words` of its command. Raises `StoreError`."""
     with reading(folder) as journal:
-        journal.row_factory = sqlite3.Row
-        latest = journal.execute("SELECT * FROM runs ORDER BY id DESC LIMIT 1").fetchone()
+        latest = _latest_run(journal)
         if latest is None:
             raise StoreError(f"{folder}: no run has begun here")
         if not isinstance(latest["settings"], str):
             raise TypeError("the settings of the latest run are no text")
-        return {**dict(latest), "words": shlex.split(str(latest["command"]))}
+        return {**latest, "words": shlex.split(str(latest["command"]))}
+
+
+def _latest_run(journal: sqlite3.Connection) -> dict[str, Any] | None:
+    cursor = journal.cursor()
+    cursor.row_factory = sqlite3.Row
+    latest = cursor.execute("SELECT * FROM runs ORDER BY id DESC LIMIT 1").fetchone()
+    return latest and dict(latest)
 
 
 def on_each_plant(folder: Path, settings: Mapping[str, Any]) -> dict[str, str]:

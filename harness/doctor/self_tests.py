@@ -1,9 +1,7 @@
-"""Self-tests of an installation: versions of packages, and wind and units of the installed JSBSim."""
+"""Self-tests: wind and units of the installed JSBSim, with each airframe."""
 
 import math
-import platform
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,46 +9,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
+from harness.doctor.finding import Finding, State
 from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof, load, si, trim
 from harness.world.air import Air
 
-PACKAGES = ("standoff-harness", "jsbsim", "numpy", "filterpy", "pandas", "pydantic", "rerun-sdk")
 WIND_TOLERANCE = 1e-6  # m/s
 UNIT_TOLERANCE = 1e-4  # relative: JSBSim rounds its factor for kg m^2
 
 
-class SelfTest(NamedTuple):
-    """The result of one self-test."""
-
-    name: str
-    measured: str  # in words, with units
-    passed: bool
-
-
-def examine() -> Iterator[SelfTest]:
-    """Runs all self-tests, one at a time."""
-    yield SelfTest("python", platform.python_version(), True)
-    for package in PACKAGES:
-        try:
-            yield SelfTest(package, version(package), True)
-        except PackageNotFoundError:
-            yield SelfTest(package, "not installed", False)
+def self_tests() -> Iterator[Finding]:
+    """Flies each airframe in wind, and compares its data with what JSBSim makes of them."""
     for name in aircraft.names():
         airframe = aircraft.folder(name)
         start = Start(airspeed=aircraft.limits(airframe).design_airspeed, heading=1.0)
         error = max(wind_triangle_error(airframe, start, Air(steady=w)) for w in ((4.0, -3.0), (-5.0, 0.0), (0.0, 5.0)))
-        yield SelfTest(
+        yield Finding(
             f"wind, {name}",
             f"v_ground - v_air - wind is {error:.1e} m/s, at most {WIND_TOLERANCE:g} allowed",
-            error < WIND_TOLERANCE,
+            State.OK if error < WIND_TOLERANCE else State.BAD,
         )
         units = compare_units(airframe)
         what, error = max(((u.quantity, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
-        yield SelfTest(
+        yield Finding(
             f"units, {name}",
             f"{len(units)} quantities, largest error {error:.1e} in {what}, at most {UNIT_TOLERANCE:g} allowed",
-            error < UNIT_TOLERANCE,
+            State.OK if error < UNIT_TOLERANCE else State.BAD,
         )
 
 
