@@ -17,7 +17,7 @@ def doctor() -> None:
       harness doctor
     """
     from harness.cli._progress import busy
-    from harness.doctor import State, examine
+    from harness.doctor import Soundness, examine
     from harness.tables import table
 
     with busy("examining this installation"):
@@ -25,10 +25,10 @@ def doctor() -> None:
     for line in table(["", "what", "measured"], ([found.state, found.name, found.measured] for found in findings)):
         click.echo(line)
     states = {found.state for found in findings}
-    if State.BAD in states:
+    if Soundness.BAD in states:
         click.echo("NOT SOUND: results of this installation cannot be trusted")
-    elif State.MISSING in states:
+    elif Soundness.MISSING in states:
         click.echo("INCOMPLETE: install what is missing")
     else:
         click.echo("sound")
-    raise SystemExit(0 if states == {State.OK} else 1)
+    raise SystemExit(0 if states == {Soundness.OK} else 1)

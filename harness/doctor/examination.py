@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from harness.doctor.finding import Finding, State
+from harness.doctor.finding import Finding, Soundness
 from harness.doctor.installation import installation
 
 
@@ -13,7 +13,7 @@ def examine() -> Iterator[Finding]:
         from harness.doctor.self_tests import self_tests
         from harness.doctor.stored_flights import compared
     except ImportError as error:
-        yield Finding("flights", f"none can be flown here: {error}", State.MISSING)
+        yield Finding("flights", f"none can be flown here: {error}", Soundness.MISSING)
         return
     yield from self_tests()
     yield from compared()

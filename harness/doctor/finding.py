@@ -4,7 +4,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 
-class State(StrEnum):
+class Soundness(StrEnum):
     """How a thing is."""
 
     OK = "ok"
@@ -17,4 +17,4 @@ class Finding(NamedTuple):
 
     name: str
     measured: str  # in words, with units
-    state: State
+    state: Soundness

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, metadata, packages_distribu
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from harness.doctor.finding import Finding, State
+from harness.doctor.finding import Finding, Soundness
 from harness.provenance import DISTRIBUTION, requirements
 
 
@@ -18,12 +18,14 @@ def installation() -> Iterator[Finding]:
     try:
         asked = SpecifierSet(str(metadata(DISTRIBUTION)["Requires-Python"]))
     except PackageNotFoundError:
-        yield Finding(DISTRIBUTION, "not installed: run `pip install` on its folder or its wheel", State.MISSING)
+        yield Finding(DISTRIBUTION, "not installed: run `pip install` on its folder or its wheel", Soundness.MISSING)
         return
     here = platform.python_version()
     serves = asked.contains(here, prereleases=True)
-    yield Finding("python", here if serves else f"{here}, needed is {asked}", State.OK if serves else State.MISSING)
-    yield Finding(DISTRIBUTION, version(DISTRIBUTION), State.OK)
+    yield Finding(
+        "python", here if serves else f"{here}, needed is {asked}", Soundness.OK if serves else Soundness.MISSING
+    )
+    yield Finding(DISTRIBUTION, version(DISTRIBUTION), Soundness.OK)
     modules = _modules()
     for text in requirements():
         yield _package(Requirement(text), modules)
@@ -35,15 +37,15 @@ def _package(requirement: Requirement, modules: dict[str, list[str]]) -> Finding
     try:
         there = version(name)
     except PackageNotFoundError:
-        return Finding(name, f"not installed, needed is {asked}", State.MISSING)
+        return Finding(name, f"not installed, needed is {asked}", Soundness.MISSING)
     if not asked.contains(there, prereleases=True):
-        return Finding(name, f"{there}, needed is {asked}", State.MISSING)
+        return Finding(name, f"{there}, needed is {asked}", Soundness.MISSING)
     try:
         for module in modules.get(_plain(name), ()):
             import_module(module)
     except Exception as error:  # whatever a broken package raises
-        return Finding(name, f"{there} cannot be loaded: {type(error).__name__}: {error}", State.MISSING)
-    return Finding(name, there, State.OK)
+        return Finding(name, f"{there} cannot be loaded: {type(error).__name__}: {error}", Soundness.MISSING)
+    return Finding(name, there, Soundness.OK)
 
 
 def _modules() -> dict[str, list[str]]:
@@ -66,6 +68,6 @@ def _viewer() -> Finding:
 
         done = subprocess.run([RERUN, "--version"], env=quiet(), capture_output=True, text=True, check=True, timeout=60)
     except (ImportError, OSError, subprocess.SubprocessError) as error:
-        return Finding("viewer", f"does not start: {error}", State.MISSING)
+        return Finding("viewer", f"does not start: {error}", Soundness.MISSING)
     elsewhere = "" if has_display() else "; no display here: `harness view --save` writes a file to open elsewhere"
-    return Finding("viewer", " ".join(done.stdout.split()[:2]) + elsewhere, State.OK)
+    return Finding("viewer", " ".join(done.stdout.split()[:2]) + elsewhere, Soundness.OK)

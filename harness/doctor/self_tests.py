@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
-from harness.doctor.finding import Finding, State
+from harness.doctor.finding import Finding, Soundness
 from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof, load, si, trim
 from harness.world.air import Air
@@ -27,14 +27,14 @@ def self_tests() -> Iterator[Finding]:
         yield Finding(
             f"wind, {name}",
             f"v_ground - v_air - wind is {error:.1e} m/s, at most {WIND_TOLERANCE:g} allowed",
-            State.OK if error < WIND_TOLERANCE else State.BAD,
+            Soundness.OK if error < WIND_TOLERANCE else Soundness.BAD,
         )
         units = compare_units(airframe)
         what, error = max(((u.quantity, abs(u.jsbsim / u.data - 1.0)) for u in units), key=lambda pair: pair[1])
         yield Finding(
             f"units, {name}",
             f"{len(units)} quantities, largest error {error:.1e} in {what}, at most {UNIT_TOLERANCE:g} allowed",
-            State.OK if error < UNIT_TOLERANCE else State.BAD,
+            Soundness.OK if error < UNIT_TOLERANCE else Soundness.BAD,
         )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from harness.doctor.finding import Finding, State
+from harness.doctor.finding import Finding, Soundness
 from harness.loop import simulate
 from harness.provenance import decides_bits, differences
 from harness.settings import flight_from_document
@@ -31,7 +31,7 @@ class StoredFlight(NamedTuple):
     seen: Mapping[str, Sequence[float]]  # quantities by the log's columns, `EVERY` so often
 
 
-class Moved(NamedTuple):
+class Deviation(NamedTuple):
     """How far a flight lies from the stored one."""
 
     by: float  # SI
@@ -47,14 +47,14 @@ def flown(flight: Mapping[str, Any]) -> StoredFlight:
     return StoredFlight(flight, log.outcome.value, len(log), log.digest, seen)
 
 
-def moved(then: StoredFlight, now: StoredFlight) -> Moved | None:
+def moved(then: StoredFlight, now: StoredFlight) -> Deviation | None:
     """The largest deviation; infinite if the flight ended otherwise, None if all bits are equal."""
     if now.digest == then.digest:
         return None
     if (now.outcome, now.rows) != (then.outcome, then.rows):
-        return Moved(math.inf, math.inf, f"its end ({now.outcome} after {now.rows} rows)")
+        return Deviation(math.inf, math.inf, f"its end ({now.outcome} after {now.rows} rows)")
     apart = [
-        Moved(abs(x - stored), abs(x - stored) / max(1.0, abs(stored)), name)
+        Deviation(abs(x - stored), abs(x - stored) / max(1.0, abs(stored)), name)
         for name, values in then.seen.items()
         for stored, x in zip(values, now.seen[name], strict=True)
     ]
@@ -72,14 +72,14 @@ def compared() -> Iterator[Finding]:
     bits, flights = stored()
     by_name = {name: found for name, then in flights.items() if (found := moved(then, flown(then.flight)))}
     if not by_name:
-        yield Finding("stored flights", f"{len(flights)} of {len(flights)} equal to the last bit", State.OK)
+        yield Finding("stored flights", f"{len(flights)} of {len(flights)} equal to the last bit", Soundness.OK)
         return
     name, worst = max(by_name.items(), key=lambda item: item[1].relative)
     yield Finding(
         "stored flights",
         f"{len(by_name)} of {len(flights)} moved, at most by {worst.by:.1e} {UNITS.get(worst.quantity, '')} in "
         f"{worst.quantity}, {TOLERANCE:g} allowed ({name})",
-        State.OK if worst.relative <= TOLERANCE else State.BAD,
+        Soundness.OK if worst.relative <= TOLERANCE else Soundness.BAD,
     )
     apart = list(differences(bits, decides_bits())) or ["nothing that is known to move bits"]
-    yield from (Finding("not as stored", each, State.OK) for each in apart)
+    yield from (Finding("not as stored", each, Soundness.OK) for each in apart)

@@ -30,7 +30,7 @@ _MOST_TICKS = 7
 _STEPS = (1.0, 2.0, 5.0)
 
 
-class Line(NamedTuple):
+class ChartLine(NamedTuple):
     """Strips of one colour, each of shape (points, 2), in the units of the chart."""
 
     strips: Sequence[Array]
@@ -38,7 +38,7 @@ class Line(NamedTuple):
     width: float  # points on the screen
 
 
-class Axis(NamedTuple):
+class ChartAxis(NamedTuple):
     """From `low` to `high`, with labelled ticks; `scale` is how many units of the picture one of its own has."""
 
     low: float
@@ -52,9 +52,9 @@ class Chart(NamedTuple):
 
     name: str
     title: str
-    x: Axis
-    y: Axis
-    lines: Sequence[Line]
+    x: ChartAxis
+    y: ChartAxis
+    lines: Sequence[ChartLine]
     labels: Sequence[tuple[float, float, str, Colour]] = ()
     moving: Sequence[StyledFlight] = ()  # flights whose place is shown at each time
 
@@ -95,7 +95,7 @@ def log_chart(to: Recorder, chart: Chart) -> None:
         to.columns(f"{entity}/moving/{i:02}", log["time"][rows], rr.Points2D.columns(positions=places))
 
 
-def _strips(strips: Sequence[Array], line: Line, order: int) -> rr.LineStrips2D:
+def _strips(strips: Sequence[Array], line: ChartLine, order: int) -> rr.LineStrips2D:
     return rr.LineStrips2D(strips, colors=line.colour, radii=-0.5 * line.width, draw_order=float(order))
 
 
@@ -116,10 +116,10 @@ def _map(flights: Sequence[StyledFlight]) -> Chart:
     east, north, standoff = longest["target_east"], longest["target_north"], longest.flight.law.standoff
     around = np.linspace(0.0, 2.0 * math.pi, 181)
     circle = np.column_stack([east[-1] + standoff * np.sin(around), north[-1] + standoff * np.cos(around)])
-    lines.append(Line([circle, np.column_stack([east, north])[::20]], TARGET, 1.0))
+    lines.append(ChartLine([circle, np.column_stack([east, north])[::20]], TARGET, 1.0))
     labels.append((float(east[-1]), float(north[-1]), "target", TARGET))
     tracks = [np.column_stack([flight.log["east"], flight.log["north"]]) for flight in flights]
-    lines += [Line([track], flight.colour, flight.width) for track, flight in zip(tracks, flights, strict=True)]
+    lines += [ChartLine([track], flight.colour, flight.width) for track, flight in zip(tracks, flights, strict=True)]
     everything = np.vstack([strip for line in lines for strip in line.strips])
     centre = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
     half = 0.54 * float(np.ptp(everything, axis=0).max())
@@ -131,7 +131,7 @@ def _map(flights: Sequence[StyledFlight]) -> Chart:
         corner, along = np.array((x.low + 0.12 * half, y.high - 0.25 * half)), np.array((wind[1], wind[0])) / speed
         tip, side = corner + 0.12 * half * along, 0.04 * half * np.array((-along[1], along[0]))
         back = tip - 0.08 * half * along
-        lines.append(Line([np.array((corner, tip)), np.array((back + side, tip, back - side))], WIND, 1.5))
+        lines.append(ChartLine([np.array((corner, tip)), np.array((back + side, tip, back - side))], WIND, 1.5))
         labels.append((float(corner[0]) + 0.2 * half, y.high - 0.02 * half, f"wind {speed:.2g} m/s", WIND))
     return Chart("map", "From above, north up", x, y, lines, labels, flights)
 
@@ -143,17 +143,17 @@ def _around(flights: Sequence[StyledFlight]) -> Chart:
         signals = Signals(flight.log)
         azimuth = np.degrees(signals.around[signals.window.first :]) % 360.0
         error = signals.circling("range_error")
-        lines.append(Line(_by_azimuth(azimuth, error, mean=is_crowd(flights)), flight.colour, flight.width))
+        lines.append(ChartLine(_by_azimuth(azimuth, error, mean=is_crowd(flights)), flight.colour, flight.width))
     values = np.concatenate([strip[:, 1] for line in lines for strip in line.strips] or [np.zeros(1)])
     reach = max(float(np.abs(values).max()), 1e-6) * 1.1
     compass = [(90.0 * i, name) for i, name in enumerate(("N", "E", "S", "W", "N"))]
     y = _axis(-reach, reach, _HEIGHT, "m")
-    zero = Line([np.array(((0.0, 0.0), (360.0, 0.0)))], GREY, 1.0)
+    zero = ChartLine([np.array(((0.0, 0.0), (360.0, 0.0)))], GREY, 1.0)
     of = ", mean of all laps" if is_crowd(flights) else ""
     return Chart(
         "azimuth",
         f"Range error round the circle while circling is judged{of} [m]",
-        Axis(0.0, 360.0, compass, _WIDTH / 360.0),
+        ChartAxis(0.0, 360.0, compass, _WIDTH / 360.0),
         y,
         [zero, *lines],
     )
@@ -181,7 +181,7 @@ def _spectrum(flights: Sequence[StyledFlight]) -> Chart:
         if not len(frequency):
             continue
         points = np.log10(np.column_stack([frequency, np.maximum(np.degrees(amplitude), _LEAST_AMPLITUDE)]))
-        lines.append(Line([points], flight.colour, flight.width))
+        lines.append(ChartLine([points], flight.colour, flight.width))
         if cycle := signals.limit_cycle:
             at = points[max(0, int(np.searchsorted(frequency, cycle.frequency, side="right")) - 1)]
             labels.append((float(at[0]), float(at[1]) + 0.5, f"limit cycle, {cycle.frequency:.2g} Hz", flight.colour))
@@ -189,7 +189,7 @@ def _spectrum(flights: Sequence[StyledFlight]) -> Chart:
     low, high = points[:, 0].min(), max(points[:, 0].max(), points[:, 0].min() + 1.0)
     top = max(float(np.ceil(points[:, 1].max() + 0.2)), 0.0)
     x, y = (
-        Axis(lowest, highest, _decade_ticks(lowest, highest, unit), length / (highest - lowest))
+        ChartAxis(lowest, highest, _decade_ticks(lowest, highest, unit), length / (highest - lowest))
         for lowest, highest, unit, length in (
             (float(low), float(high), "Hz", _WIDTH),
             (math.log10(_LEAST_AMPLITUDE), top, "°/s", _HEIGHT),
@@ -198,13 +198,13 @@ def _spectrum(flights: Sequence[StyledFlight]) -> Chart:
     return Chart("spectrum", "Spectrum of the law's command while circling is judged [deg/s]", x, y, lines, labels)
 
 
-def _axis(low: float, high: float, length: float, unit: str) -> Axis:
+def _axis(low: float, high: float, length: float, unit: str) -> ChartAxis:
     """An axis with round ticks."""
     least = (high - low) / _MOST_TICKS
     decade = 10.0 ** math.floor(math.log10(least))
     step = next(decade * s for s in (*_STEPS, 10.0) if decade * s >= least)
     values = np.arange(math.ceil(low / step), math.floor(high / step) + 1) * step
-    return Axis(low, high, [(float(value), f"{value:.4g} {unit}") for value in values], length / (high - low))
+    return ChartAxis(low, high, [(float(value), f"{value:.4g} {unit}") for value in values], length / (high - low))
 
 
 def _decade_ticks(low: float, high: float, unit: str) -> list[tuple[float, str]]:
