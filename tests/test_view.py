@@ -138,7 +138,10 @@ def test_without_a_display_the_way_out_is_named(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "a.rrd").touch()
     done = invoke("view", tmp_path / "a.rrd")
     assert done.exit_code == 2
-    assert done.stderr == "there is no display here: write a file with --save, and open it where there is one\n"
+    assert (
+        done.stderr
+        == "there is no display here: use --web, or write a file with --save and open it where there is one\n"
+    )
 
 
 def test_an_empty_viewer_on_a_port_that_is_taken_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

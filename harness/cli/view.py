@@ -22,19 +22,23 @@ _MOST_OFFERED = 20  # flights, where none is chosen
 )
 @click.option("--pair", metavar="KEY", help="Show this flight on every plant; kinematic is the reference.")
 @click.option("--save", type=PATH, metavar="FILE.rrd", help="Write this recording; open no viewer.")
+@click.option("--web", is_flag=True, help="Serve the viewer to a browser, here or by SSH; open no window.")
 @click.option("--port", type=click.IntRange(1, 65535), default=9876, show_default=True, help="Port of the viewer.")
-def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Path | None, port: int) -> None:
+def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Path | None, web: bool, port: int) -> None:
     """Open flights in the Rerun viewer.
 
     Several flights share one scene and the same plots. The beginning of a KEY is enough; for a FILE.rrd with several
     flights, KEY is the name of a flight. A flight without a recording is flown again and compared with what is
-    stored. Without arguments an empty viewer opens, for `harness fly --live`. With --save prints the file written.
+    stored. Without arguments an empty viewer opens, for `harness fly --live`. With --save prints the file written. With
+    --web, for a machine without a screen, prints the address to open and the SSH tunnel to type, and listens on
+    127.0.0.1 alone.
 
     \b
     Examples:
       harness view flight.rrd
       harness view out/wind --flight 3f2a --flight 9c01
       harness view out/wind --pair 3f2a --save pair.rrd
+      harness view out/wind --pair 3f2a --web
     """
     import tempfile
 
@@ -42,17 +46,21 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
     from harness.cli._paths import writable
 
     if what is None:
-        if flights or pair or save:
-            raise BadInput("--flight, --pair and --save require a folder or a file: harness view DIR|FILE.rrd ...")
+        if flights or pair or save or web:
+            raise BadInput(
+                "--flight, --pair, --save and --web require a folder or a file: harness view DIR|FILE.rrd ..."
+            )
         click.echo(
             f"opening an empty viewer, for harness fly --live{'' if port == 9876 else f' --port {port}'}", err=True
         )
         return _open(None, port)
+    if save is not None and web:
+        raise BadInput("--save and --web exclude each other")
     if save is not None:
         writable(save)
     logs = _logs(what, flights, pair)
     if logs is None and save is None:
-        return _open(Path(what), port)
+        return _open(Path(what), port, web)
     if logs is None:
         raise BadInput(f"{what}: is a recording already; choose some of its flights with --flight NAME")
 
@@ -66,7 +74,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
     with tempfile.TemporaryDirectory(prefix="standoff-harness-") as folder:
         path = Path(folder) / "flights.rrd"
         write_recording(path, logs, title, command=typed())
-        _open(path, port)
+        _open(path, port, web)
     return None
 
 
@@ -132,11 +140,14 @@ def _of_file(path: Path, names: tuple[str, ...]) -> dict[str, FlightLog] | None:
     return {name: held[name] for name in names}
 
 
-def _open(path: Path | None, port: int) -> None:
+def _open(path: Path | None, port: int, web: bool = False) -> None:
     from harness.cli._input import BadInput
-    from harness.review.viewer import ViewerError, show
+    from harness.review.viewer import ViewerError, serve, show
 
     try:
-        show(path, port)
+        if web and path is not None:
+            serve(path, click.echo, port)
+        else:
+            show(path, port)
     except ViewerError as error:
         raise BadInput(str(error)) from None

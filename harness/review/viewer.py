@@ -6,7 +6,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+import urllib.parse
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -58,7 +59,9 @@ def show(path: Path | None, port: int = PORT) -> None:
     If another viewer has the port, the window uses a free one: Rerun would send the recording to the other viewer.
     """
     if not has_display():
-        raise ViewerError("there is no display here: write a file with --save, and open it where there is one")
+        raise ViewerError(
+            "there is no display here: use --web, or write a file with --save and open it where there is one"
+        )
     if listening(port):
         if path is None:
             raise ViewerError(f"port {port} is taken, perhaps by an open viewer: use that one, or another --port")
@@ -70,6 +73,29 @@ def show(path: Path | None, port: int = PORT) -> None:
         _stop(window)
     if code:
         raise ViewerError(f"the viewer ended with {code}; its own words are above")
+
+
+def serve(path: Path, said: Callable[[str], None], port: int = PORT) -> None:
+    """Serves Rerun's web viewer with the recording on the loopback address until it is interrupted.
+
+    `said` gets what to open, and what to type on the machine that has a screen. Raises `ViewerError`.
+    """
+    data, page = (port if not listening(port) else free_port()), free_port()
+    server = _started(["--serve-web", *_at(data), "--web-viewer-port", str(page), str(path)], subprocess.DEVNULL)
+    try:
+        deadline = time.monotonic() + 60.0
+        while not (listening(page) and listening(data)):
+            if server.poll() is not None or time.monotonic() > deadline:
+                raise ViewerError("the web viewer does not start")
+            time.sleep(0.05)
+        source = urllib.parse.quote(address(data), safe="")
+        said(f"open http://{HOST}:{page}/?url={source}")
+        said(f"from another machine first: ssh -L {page}:{HOST}:{page} -L {data}:{HOST}:{data} {socket.gethostname()}")
+        said("Ctrl-C ends it")
+        server.wait()
+    finally:
+        _stop(server)
+    raise ViewerError(f"the web viewer ended with {server.returncode}")
 
 
 @contextmanager
