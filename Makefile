@@ -30,7 +30,7 @@ models: install  ## write the JSBSim models from the airframes' data
 	$(BIN)/python -m aircraft.write_models
 
 identify: install  ## fly and fit the airframes anew: aircraft/*/identified.toml
-	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name || exit 1; done
+	for name in ultra_stick_25e skywalker_x8 aerosonde; do $(BIN)/harness identify $$name --keep || exit 1; done
 
 paper: install  ## the paper's numbers, figures and claims under docs/answers, on the airframes too (a quarter of an hour)
 	$(BIN)/harness reproduce --out docs/answers --sixdof

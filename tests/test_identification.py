@@ -141,7 +141,7 @@ def test_the_command_identifies_draws_keeps_and_says_how_long_is_left(
     airframe = copied_airframe("skywalker_x8", tmp_path / "skywalker_x8")
     aircraft.identified(airframe).write_text("damaged", encoding="utf-8")
     monkeypatch.setattr(_progress, "_EVERY", 0.0)  # a line after each part
-    result = invoke("identify", airframe, "--out", tmp_path / "plots")
+    result = invoke("identify", airframe, "--keep", "--out", tmp_path / "plots")
     assert result.exit_code == 0, result.output
     told = [line for line in result.stderr.splitlines() if line.startswith("identifying skywalker_x8: ")]
     assert len(told) == 34  # 32 flights and two fits
@@ -150,8 +150,10 @@ def test_the_command_identifies_draws_keeps_and_says_how_long_is_left(
     for words in ("63 %", "bandwidth", "turn ratio", "delay", "damping", "lagged  coordinated"):
         assert words in result.output
     assert sorted(path.name for path in (tmp_path / "plots").iterdir()) == [
-        "skywalker_x8_bode.svg", "skywalker_x8_step.svg",
+        "skywalker_x8_bode.svg", "skywalker_x8_identified.toml", "skywalker_x8_step.svg",
     ]  # fmt: skip
+    written = (tmp_path / "plots" / "skywalker_x8_identified.toml").read_bytes()
+    assert written == aircraft.identified(airframe).read_bytes()
     (found,), (kept,) = read(airframe), read(aircraft.folder("skywalker_x8"))
     assert found.measured == pytest.approx(dict(kept.measured), rel=1e-3)
     for name, pair in kept.errors.items():

@@ -11,18 +11,20 @@ from harness.cli._paths import PATH
 @click.argument("aircraft")
 @click.option("--airspeed", type=float, help="m/s. [default: the airspeed that the inner loop was tuned at]")
 @click.option("--out", type=PATH, default=Path("out/identify"), show_default=True)
-def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
+@click.option("--keep", is_flag=True, help="Keep the parameters beside the airframe too: plants fly by them.")
+def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> None:
     """Identify how an airframe follows a heading-rate command.
 
     AIRCRAFT is a name or a folder. Flies steps and sweeps of the heading-rate command on the 6-DOF plant and fits the
     plants `lagged` and `coordinated` to them. Prints the step and frequency response, the fit, and its errors on
-    manoeuvres that the fit did not use. The parameters are kept in identified.toml beside the aircraft, for each
-    airspeed; a step plot and a Bode plot are written to OUT. Takes 10 s on
-    a quick machine and a minute on a slow or busy one; how long is left is said on the way.
+    manoeuvres that the fit did not use. The parameters, a step plot and a Bode plot are written to OUT; with --keep the
+    parameters are kept in identified.toml beside the airframe too, for each airspeed. Takes 10 s on a quick machine and
+    a minute on a slow or busy one; how long is left is said on the way.
 
     \b
-    Example:
+    Examples:
       harness identify ultra_stick_25e --airspeed 15
+      harness identify my_airframe --keep
     """
     from aircraft import identified as file_of
     from aircraft import limits
@@ -42,8 +44,8 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     except ValueError as error:
         raise BadInput(f"AIRCRAFT: {error}") from None
     speed = limits(airframe).design_airspeed if airspeed is None else airspeed
-    file = writable(file_of(airframe))
     writable_folder(out)
+    files = [writable(out / f"{airframe.name}_identified.toml"), *([writable(file_of(airframe))] if keep else [])]
     plots = {
         writable(out / f"{airframe.name}_step.svg"): step_plot,
         writable(out / f"{airframe.name}_bode.svg"): bode_plot,
@@ -62,6 +64,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path) -> None:
     for line in summary_lines(identification):
         click.echo(line)
     drawn = {path: plot(identification) for path, plot in plots.items()}
-    for path, text in {file: document(airframe, [*others, identification.identified]), **drawn}.items():
+    parameters = document(airframe, [*others, identification.identified])
+    for path, text in {**dict.fromkeys(files, parameters), **drawn}.items():
         write_text(path, text)
-    click.echo(f"parameters: {file}\nplots: {', '.join(map(str, plots))}")
+    click.echo(f"parameters: {', '.join(map(str, files))}\nplots: {', '.join(map(str, plots))}")

@@ -74,7 +74,7 @@ def identified(airframe: Path, airspeed: float) -> Identified:
         at = f"identified at {speeds} m/s" if known else "not identified"
         raise IdentifiedError(
             f"{airframe.name} is {at}, the flight is at {airspeed:g} m/s: "
-            f"run harness identify {airframe_argument(airframe)} --airspeed {airspeed:g}"
+            f"run harness identify {airframe_argument(airframe)} --airspeed {airspeed:g} --keep"
         )
     return near
 
@@ -88,7 +88,7 @@ def read(airframe: Path) -> list[Identified]:
         tables = tables_of(file.read_text(encoding="utf-8"))["at"]
         return sorted((_from(table) for table in tables), key=lambda entry: entry.airspeed)
     except (AttributeError, LookupError, TypeError, ValueError, ArithmeticError) as error:
-        again = f"run harness identify {airframe_argument(airframe)}"
+        again = f"run harness identify {airframe_argument(airframe)} --keep"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
 
 

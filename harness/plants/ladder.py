@@ -106,7 +106,7 @@ def _identification_warnings(setup: Setup) -> list[str]:
 
     warnings = []
     if is_stale(setup.airframe):
-        again = f"run harness identify {airframe_argument(setup.airframe)}"
+        again = f"run harness identify {airframe_argument(setup.airframe)} --keep"
         warnings.append(f"{setup.airframe.name} has changed since it was identified: {again}")
     if not setup.rate_trim:
         warnings.append("rate_trim = false changes the plant sixdof only: this plant has no shortfall of turn rate")
