@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,21 +80,21 @@ def fly_matrix(matrix: Matrix, out: Path, options: Options) -> Progress:
     Raises `StoreError` and `WorkersError`.
     """
     from harness.runs.results import export
+    from harness.runs.run import run
 
-    progress = _fly(matrix, out, options)
+    progress = flown_out(run(matrix, out, options), out)
     with busy("writing the table of flights"):
         export(out)
     _print_results(matrix, out, progress)
     return progress
 
 
-def _fly(matrix: Matrix, out: Path, options: Options) -> Progress:
+def flown_out(flying: Iterator[Progress], out: Path) -> Progress:
+    """Flies on until all is done and shows how far it is; Ctrl-C says what is kept."""
     import signal
 
-    from harness.runs.run import run
-
     progress = None
-    states = of_run(run(matrix, out, options))
+    states = of_run(flying)
     try:
         while (state := next(states, None)) is not None:
             progress = state

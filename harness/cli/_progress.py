@@ -98,6 +98,8 @@ def _line(state: Progress) -> str:
         parts.append(f"{rate:.3g} flights/s")
         if state.left is not None and finished < state.total:
             parts.append(f"{duration(state.left)} left")
+    if state.note:
+        parts.append(state.note)
     return ", ".join(parts)
 
 

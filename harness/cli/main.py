@@ -40,6 +40,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
             "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
+            "tune": Entry("tune:tune", "Search for the settings that do best."),
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },
         "The paper": {

@@ -12,7 +12,7 @@ from pathlib import Path
 import aircraft
 from autopilot.guidance import Law
 from harness.flight import Flight
-from harness.limit_cycle.prediction import LimitCycle, Loop, boundary, critical_gain, crossover, limit_cycle
+from harness.limit_cycle.prediction import Crossover, LimitCycle, Loop, boundary, critical_gain, crossover, limit_cycle
 from harness.plants.identified import IdentifiedError, Sweep, identified
 
 # 1.5 is 3.5 dB. MIL-F-9490D asks 6 dB, a factor of 2, and 45 deg of a flight control system, of what its model leaves
@@ -70,10 +70,9 @@ def following_of(law: Law, airframe: Path, airspeed: float, period: float) -> Fo
 
 @lru_cache(maxsize=4096)
 def _following(loop: Loop, sweep: Sweep | None) -> Following:
-    if loop.law.max_heading_rate <= abs(loop.turn):
+    if not _is_held(loop):
         return Following(reason="the circle cannot be held: the heading-rate limit is below what it takes")
-    crossing = crossover(loop)
-    margin = gain_margin(loop, crossing.gain if crossing else None)
+    crossing, margin = _crossing_and_margin(loop)
     gain, phase = sweep.at(crossing.frequency) if sweep and crossing else (math.nan, math.nan)
     return Following(
         reason="",
@@ -85,6 +84,26 @@ def _following(loop: Loop, sweep: Sweep | None) -> Following:
         margin=_known(margin),
         cycle=None if margin > _CALM else limit_cycle(loop),
     )
+
+
+def margin_of(flight: Flight) -> float | None:
+    """The margin of `following` alone, in a third of the time; None when unknown."""
+    try:
+        found = identified(aircraft.folder(flight.aircraft), flight.start.airspeed)
+    except IdentifiedError:
+        return None
+    loop = Loop(flight.law, found.heading_rate, flight.start.airspeed, flight.guidance_period)
+    return _known(_crossing_and_margin(loop)[1]) if _is_held(loop) else None
+
+
+@lru_cache(maxsize=4096)
+def _crossing_and_margin(loop: Loop) -> tuple[Crossover | None, float]:
+    crossing = crossover(loop)
+    return crossing, gain_margin(loop, crossing.gain if crossing else None)
+
+
+def _is_held(loop: Loop) -> bool:
+    return loop.law.max_heading_rate > abs(loop.turn)
 
 
 def gain_margin(loop: Loop, gain: float | None = None) -> float:

@@ -14,7 +14,7 @@ from harness.settings import Experiment, SettingsError, SettingsFile, flight_fro
 from harness.settings.keys import is_list
 from harness.settings.mended import TOLD
 from harness.settings.toml_locator import Key, nearest_line
-from harness.toml_text import shortened, shown
+from harness.toml_text import shown
 from harness.world.randomness import stream
 
 
@@ -208,7 +208,7 @@ def _given(
         try:
             axes.append(axis(name, given[name], lists=True, line=lambda _: 0))
         except ValueError as error:
-            mistakes.append(f"--set {shortened(text)}: {error}")
+            mistakes.append(f"{text}: {error}")
             mistaken[name] = 0  # the place of an override is the override
     return replace(file, document=document), given, axes
 

@@ -49,6 +49,7 @@ class Progress:
     unrecorded: list[str] = field(default_factory=list)  # what went wrong, for each recording that is missing
     seconds: float = 0.0  # since the first flight was sent out
     left: float | None = None  # estimated time until the end, s; None while it is unknown
+    note: str = ""  # what there is to tell beside the counts
 
 
 def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
@@ -60,34 +61,47 @@ def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:
     if matrix.mistakes:
         raise SettingsError(matrix.mistakes)
     with Store(folder) as store:
-        _warn_of_flights_from_elsewhere(store)
+        warn_of_flights_from_elsewhere(store)
         experiment = matrix.experiment
         store.begin(provenance(matrix.file.path, matrix.file.text, experiment.title, experiment.question))
         count = len(matrix)
         progress = Progress(count if options.limit is None else min(count, options.limit))
-        pending: dict[str, _Pending] = {}
-        wall_time, time_left = WallTime(), TimeLeft(options.typical, options.workers)
+        pending: dict[str, Pending] = {}
+        time_left = TimeLeft(options.typical, options.workers)
         tasks = _tasks(matrix, store, options, progress, pending, time_left)
-        flying = fly_all(
-            tasks, folder, workers=options.workers, wall_time=wall_time, timeout=options.timeout, fly=options.fly
-        )
-        begin = time.monotonic()
-        try:
-            for done in flying:
-                now = time.monotonic() - begin
-                if done is not None:
-                    _keep(store, done, pending.pop(done.task.key), progress)
-                    time_left.learn(done.task.flight, done.result.result.seconds, now)
-                store.tick()
-                progress.out, progress.seconds, progress.left = len(pending), now, time_left.seconds(now)
-                yield progress
-        finally:
-            flying.close()
+        for _ in flown(tasks, store, options, progress, pending, time_left):
+            yield progress
         store.end()
         yield progress
 
 
-def _warn_of_flights_from_elsewhere(store: Store) -> None:
+def flown(
+    tasks: Iterator[Task | None],
+    store: Store,
+    options: Options,
+    progress: Progress,
+    pending: "dict[str, Pending]",
+    time_left: TimeLeft,
+) -> Iterator[Done | None]:
+    """Flies the tasks, each entered in `pending` by its key, and keeps and counts them: see `fly_all`."""
+    flying = fly_all(
+        tasks, store.folder, workers=options.workers, wall_time=WallTime(), timeout=options.timeout, fly=options.fly
+    )
+    begin = time.monotonic()
+    try:
+        for done in flying:
+            now = time.monotonic() - begin
+            if done is not None:
+                _keep(store, done, pending.pop(done.task.key), progress)
+                time_left.learn(done.task.flight, done.result.result.seconds, now)
+            store.tick()
+            progress.out, progress.seconds, progress.left = len(pending), now, time_left.seconds(now)
+            yield done
+    finally:
+        flying.close()
+
+
+def warn_of_flights_from_elsewhere(store: Store) -> None:
     """Once: the run that begins now is the latest the next time."""
     earlier = store.latest_run()
     if earlier and (apart := list(differences(decided_bits(earlier), decides_bits()))):
@@ -98,14 +112,14 @@ def _warn_of_flights_from_elsewhere(store: Store) -> None:
         )
 
 
-class _Pending(NamedTuple):
+class Pending(NamedTuple):
     """A flight that was sent out."""
 
     identity: Identity
     earlier: Outcome | None  # how it ended when its row was made: it is flown again for its recording
 
 
-def _keep(store: Store, done: Done, pending: _Pending, progress: Progress) -> None:
+def _keep(store: Store, done: Done, pending: Pending, progress: Progress) -> None:
     task, (result, version, problem) = done
     outcome = Outcome(result.outcome)
     if version != task.version:
@@ -135,7 +149,7 @@ def _tasks(
     store: Store,
     options: Options,
     progress: Progress,
-    pending: dict[str, _Pending],
+    pending: dict[str, Pending],
     time_left: TimeLeft,
 ) -> Iterator[Task]:
     """The flights that are not done yet or lack their recording, one at a time, each entered in `pending`."""
@@ -166,7 +180,7 @@ def _tasks(
         elif earlier and not (this and lacks_recording(store.folder, key, record, earlier)):
             _count_earlier(progress, earlier)
         elif this:
-            pending[key] = _Pending(this, earlier)
+            pending[key] = Pending(this, earlier)
             yield Task(key, position, flight, this.version.number, record)
         met.add(key)
 

@@ -158,6 +158,11 @@ class Store:
         rows = self._all(f"SELECT key, outcome FROM flights WHERE {_done(retry_failed)}")
         return {key: Outcome(outcome) for key, outcome in rows}
 
+    def found(self, key: str, *, retry_failed: bool) -> tuple[Outcome, dict[str, Any]] | None:
+        """Outcome and metrics of the row with this key; None without one that is not to be flown again."""
+        rows = self._all(f"SELECT outcome, metrics FROM flights WHERE key = ? AND {_done(retry_failed)}", (key,))
+        return next(((Outcome(outcome), _numbers(metrics)) for outcome, metrics in rows), None)
+
     def commit(self) -> None:
         """Commits all changes."""
         if self._begun is not None:

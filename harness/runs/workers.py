@@ -110,7 +110,7 @@ def _how_hung(chunk: _Chunk) -> str:
 
 
 def fly_all(
-    tasks: Iterator[Task],
+    tasks: Iterator[Task | None],
     folder: Path,
     *,
     workers: int,
@@ -120,11 +120,12 @@ def fly_all(
 ) -> Generator[Done | None]:
     """Flies the tasks and yields each when it is done, in any order; None now and then while there is nothing to yield.
 
-    A few chunks are sent out ahead. With `workers` = 0 the tasks are flown in this process, one by one, without a
-    timeout. Closing the generator ends every worker at once. Raises `WorkersError` when workers cannot be kept alive.
+    A None among the tasks says that the next one waits for flights that are out. A few chunks are sent out ahead. With
+    `workers` = 0 the tasks are flown in this process, one by one, without a timeout. Closing the generator ends every
+    worker at once. Raises `WorkersError` when workers cannot be kept alive.
     """
     if not workers:
-        for task in tasks:
+        for task in filter(None, tasks):
             yield Done(task, fly(task, folder))
         return
     yield from _Flying(tasks, folder, workers, wall_time, timeout, fly).results()
@@ -134,7 +135,7 @@ class _Flying:
     """The state of `fly_all`."""
 
     def __init__(
-        self, tasks: Iterator[Task], folder: Path, workers: int, wall_time: WallTime, timeout: float, fly: Fly
+        self, tasks: Iterator[Task | None], folder: Path, workers: int, wall_time: WallTime, timeout: float, fly: Fly
     ) -> None:
         self.tasks, self.folder, self.workers, self.timeout, self.fly = tasks, folder, workers, timeout, fly
         self.wall_time = wall_time

@@ -36,7 +36,7 @@ class SettingsFile:
     text: str  # as it was read, once: a pipe has no second time
     document: Mapping[str, object]  # in file units, with the overrides
     lines: Mapping[Key, int]  # the line of each key, from 1
-    overrides: Mapping[Key, str]  # by key, the text KEY=VALUE that sets it
+    overrides: Mapping[Key, str]  # by key, what sets it: `--set KEY=VALUE`
 
     def flight(self, *, started: bool = False) -> Flight:
         """The file's one flight; with `started` it is tried whether it can start. Raises `SettingsError`."""
@@ -89,7 +89,7 @@ class SettingsFile:
     def _place(self, key: Key) -> Place:
         for length in range(len(key), 0, -1):
             if key[:length] in self.overrides:
-                return Place(sys.maxsize, f"--set {shortened(self.overrides[key[:length]])}")
+                return Place(sys.maxsize, self.overrides[key[:length]])
         line = nearest_line(self.lines, key)
         return Place(line, f"{self.path}:{line}")
 
@@ -126,8 +126,10 @@ def settings_from_text(text: str, path: Path, overrides: Sequence[str] = ()) -> 
     return overridden(SettingsFile(path, text, document, key_lines(text), {}), overrides)
 
 
-def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
+def overridden(file: SettingsFile, overrides: Sequence[str], option: str = "--set") -> SettingsFile:
     """The file with the texts KEY=VALUE merged into its [flight]; their paths start at the working folder.
+
+    `option` of the command line gave them: it stands in messages.
 
     Raises `SettingsError`.
     """
@@ -137,7 +139,7 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
     for override in overrides:
         name, equals, value = override.partition("=")
         if not equals:
-            wrong.append(f"--set {shortened(override)}: must be KEY=VALUE, as in law.gains=paper_1")
+            wrong.append(f"{option} {shortened(override)}: must be KEY=VALUE, as in law.gains=paper_1")
             continue
         try:
             given = value_of(value)
@@ -148,10 +150,10 @@ def overridden(file: SettingsFile, overrides: Sequence[str]) -> SettingsFile:
                 [_absolute(key, one) for one in given] if isinstance(given, list) else _absolute(key, given),
             )
         except SettingsError as error:
-            wrong.append(f"--set {shortened(override)}: {error}")
+            wrong.append(f"{option} {shortened(override)}: {error}")
             continue
         merged = {k: o for k, o in merged.items() if k[: len(key)] != key}  # without those that it replaces
-        merged[key] = override
+        merged[key] = f"{option} {shortened(override)}"
     if wrong:
         raise SettingsError(wrong)
     changed = replace(file, document=document, overrides=merged)

@@ -1,6 +1,8 @@
-"""A flight as the [flight] table of a settings file."""
+"""A flight as the [flight] table of a settings file, and as its text."""
 
+import json
 import math
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from autopilot.laws import LAWS
@@ -20,6 +22,31 @@ def document(flight: Flight) -> dict[str, Any]:
         own = type(flight.law).__name__
         raise SettingsError([f"flight.law: {own} has no name in autopilot/laws.py, by which a file could keep it"])
     return {**written(flight), "law": {"name": name, **written(flight.law)}}
+
+
+def toml(flight: Flight) -> str:
+    """The [flight] of a settings file, every key written out. Raises `SettingsError` for a law without a name."""
+    return "\n".join(_toml(document(flight), "flight")) + "\n"
+
+
+def _toml(table: Mapping[str, Any], name: str) -> Iterator[str]:
+    """A table and those within it; a key without a value is left out."""
+    yield f"[{name}]"
+    for key, value in table.items():
+        if value is not None and not isinstance(value, Mapping):
+            yield f"{key} = {_toml_value(value)}"
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield ""
+            yield from _toml(value, f"{name}.{key}")
+
+
+def _toml_value(value: object) -> str:
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {_toml_value(inner)}' for key, inner in value.items())} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def written(part: object) -> dict[str, Any]:

@@ -1,0 +1,55 @@
+"""What is predicted of a flight as numbers by name, for tables of results and for requirements."""
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import aircraft
+from harness.error import HarnessError
+from harness.flight import Flight
+from harness.limit_cycle.margin import Following, following, margin_of
+from harness.plants.identified import is_stale
+from harness.plants.ladder import PLANTS
+
+MARGIN = "limit_cycle_margin"
+LARGEST = 99.0  # a margin beyond it is written as this: it decides nothing more
+
+PREDICTED: Mapping[str, Callable[[Following], float | None]] = MappingProxyType(
+    {
+        "heading_rate_gain_slow": lambda found: found.low_frequency_gain,
+        "heading_rate_delay_s": lambda found: found.crossover_delay,
+        MARGIN: lambda found: None if found.margin is None else min(found.margin, LARGEST),
+        "predicted_cycle_hz": lambda found: found.cycle.frequency if found.cycle else None,
+        "predicted_cycle_amplitude_deg_s": lambda found: (
+            math.degrees(found.cycle.heading_rate) if found.cycle else None
+        ),
+    }
+)
+
+
+def predicted(flight: Flight) -> dict[str, float | None]:
+    """The numbers of `PREDICTED`. All are None where `why_unknown` has a reason."""
+    found = Following(reason=reason) if (reason := _why_not(flight)) else following(flight)
+    return {name: None if found.reason else of(found) for name, of in PREDICTED.items()}
+
+
+def predicted_margin(flight: Flight) -> float | None:
+    """The one of `MARGIN` alone, in a third of the time."""
+    margin = None if _why_not(flight) else margin_of(flight)
+    return None if margin is None else min(margin, LARGEST)
+
+
+def why_unknown(flight: Flight) -> str:
+    """Why nothing is predicted of the flight; empty when it is."""
+    return _why_not(flight) or following(flight).reason
+
+
+def _why_not(flight: Flight) -> str:
+    """What keeps from asking for a prediction; empty when nothing does."""
+    if not PLANTS[flight.plant].has_airframe:
+        return f"the plant {flight.plant} has no airframe"
+    try:
+        stale = is_stale(aircraft.folder(flight.aircraft))
+    except (HarnessError, OSError) as error:
+        return str(error)
+    return f"the model of {flight.aircraft} has changed since it was identified" if stale else ""
