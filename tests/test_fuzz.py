@@ -128,6 +128,11 @@ CALLS: Mapping[str, Sequence[str]] = {
         f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --set aircraft=AIRFRAME",
         "MATRIX --out RUN --limit 8 --workers 0 --log none", "MATRIX --dry-run --limit WORD",
     ],
+    "tune": [
+        f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --minimise range_error_peak_m",
+        "MATRIX --out OUT --over WORD --minimise laps", "FILE --out OUT --over law.k2=1:9 --minimise WORD",
+        "FILE --out OUT --over law.k2=1:9 --minimise laps --subject-to WORD",
+    ],
     "show": ["RUN", "RUN:KEY", "RUN --where SET --sort WORD", "RUN --columns WORD --csv", "WORD", "RUN:WORD"],
     "compare": [
         "RUN", "RUN --json --set SET", "RUN --by WORD --baseline WORD", "RUN --where SET", "RUN --by seed --latex",
