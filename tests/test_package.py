@@ -1,22 +1,25 @@
 """What is installed: the wheel, the names it takes, and the lock file that everything rests on."""
 
+import os
 import re
+import shutil
 import subprocess
 import sys
+import sysconfig
 import tomllib
+import venv
 import zipfile
 from importlib.metadata import distributions
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from benchmarks.installation import build
+from tests.builders import ROOT
+
 PACKAGES = {"harness", "autopilot", "aircraft"}
 
 
 def test_the_wheel_holds_every_file_of_the_three_packages_and_nothing_else(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(tmp_path)]
-    subprocess.run(command, check=True, cwd=ROOT, capture_output=True)
-    (wheel,) = tmp_path.glob("*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
+    names = zipfile.ZipFile(build(tmp_path)).namelist()
     held = {name for name in names if ".dist-info/" not in name}
     sources = {
         path.relative_to(ROOT).as_posix()
@@ -26,6 +29,46 @@ def test_the_wheel_holds_every_file_of_the_three_packages_and_nothing_else(tmp_p
     }
     assert held == sources
     assert {name.partition("/licenses/")[2] for name in names if "/licenses/" in name} == {"LICENSE", "NOTICE"}
+
+
+def test_the_wheel_works_without_the_source_tree_from_another_folder_and_writes_nothing_where_it_lies(
+    tmp_path: Path,
+) -> None:
+    """Installed in an environment of its own, with links to the libraries of this one."""
+    wheel, there, elsewhere = build(tmp_path), tmp_path / "environment", tmp_path / "elsewhere"
+    venv.create(there, symlinks=True)
+    packages = Path(sysconfig.get_path("purelib", vars={"base": str(there), "platbase": str(there)}))
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--python", str(there / "bin/python")]
+    subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], check=True)
+    for library in Path(sysconfig.get_path("purelib")).iterdir():
+        if library.suffix != ".pth" and not library.name.startswith(("standoff_harness", "__pycache__")):
+            (packages / library.name).symlink_to(library)
+    for path in (packages, *packages.rglob("*")):
+        if not path.is_symlink():
+            path.chmod(path.stat().st_mode & ~0o222)
+    before = listing(packages)
+    elsewhere.mkdir()
+    shutil.copy(ROOT / "experiments" / "stationary.toml", elsewhere / "one.toml")
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    for words in (
+        "fly one.toml --rrd one.rrd",
+        'run one.toml --out out --set plant=["kinematic","sixdof"] --set duration_s=20',
+        "report out",
+        "demo --out demo",
+        "view out --flight KEY --save two.rrd",
+        "doctor",
+    ):
+        (key, *_) = [path.stem for path in elsewhere.glob("out/flights/*.rrd")] or [""]
+        called = [str(there / "bin/harness"), *words.replace("KEY", key).split()]
+        done = subprocess.run(called, cwd=elsewhere, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, (words, done.stdout, done.stderr)
+    assert {"one.rrd", "out", "demo", "two.rrd"} <= {path.name for path in elsewhere.iterdir()}
+    assert (elsewhere / "out" / "report.html").is_file()
+    assert listing(packages) == before
+
+
+def listing(folder: Path) -> dict[Path, tuple[int, int]]:
+    return {path: (path.lstat().st_mtime_ns, path.lstat().st_size) for path in folder.rglob("*")}
 
 
 def test_the_notice_names_every_airframe_that_is_shipped() -> None:

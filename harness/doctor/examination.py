@@ -12,7 +12,7 @@ def examine() -> Iterator[Finding]:
     try:
         from harness.doctor.self_tests import self_tests
         from harness.doctor.stored_flights import compared
-    except ImportError as error:
+    except (ImportError, OSError) as error:  # JSBSim raises the second where its data are missing
         yield Finding("flights", f"none can be flown here: {error}", Soundness.MISSING)
         return
     yield from self_tests()
