@@ -177,3 +177,13 @@ def shifted(
     seeds = flights["seed"][chosen]
     flights.loc[chosen, metric] += by + scatter * np.random.default_rng(3).normal(size=SEEDS)[seeds]
     return flights
+
+
+def chromium() -> str:
+    """Where Chromium is; without it the test is skipped, but for CI, where it has to be."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if found := shutil.which(name):
+            return found
+    if os.environ.get("CI"):
+        pytest.fail("no Chromium to open the page with")
+    pytest.skip("no Chromium to open the page with")

@@ -3,9 +3,7 @@
 import csv
 import io
 import json
-import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ from typing import Any
 import pytest
 
 import harness
-from tests.builders import command, copied_airframe, invoke, write
+from tests.builders import chromium, command, copied_airframe, invoke, write
 
 EXPERIMENT = """\
 title = "Two limits"
@@ -202,16 +200,6 @@ def test_the_page_is_one_small_file(page: Path) -> None:
     assert len(text.encode()) < 3_000_000
     fetched = re.findall(r"(?:src|href)\s*=\s*[\"']?(?!#)([^\"'> ]+)|url\((?!#)([^)]+)\)|@import", text)
     assert fetched == []
-
-
-def chromium() -> str:
-    """Where Chromium is; without it the test is skipped, but for CI, where it has to be."""
-    for name in ("chromium", "chromium-browser", "google-chrome"):
-        if found := shutil.which(name):
-            return found
-    if os.environ.get("CI"):
-        pytest.fail("no Chromium to open the page with")
-    pytest.skip("no Chromium to open the page with")
 
 
 def opened(page: Path, profile: Path) -> subprocess.CompletedProcess[str]:

@@ -43,7 +43,8 @@ def test_a_package_that_cannot_be_loaded_or_is_too_old_is_missing_and_hides_noth
 
 
 @pytest.mark.skipif(
-    (platform.machine(), platform.libc_ver()[0]) != ("x86_64", "glibc"), reason="glibc alone can feign a processor"
+    (platform.machine(), platform.libc_ver()[0]) != ("x86_64", "glibc"),
+    reason="GLIBC_TUNABLES hides AVX and FMA from glibc on x86_64 alone",
 )
 def test_on_another_processor_it_says_by_how_much_flights_move_and_that_it_is_the_processor() -> None:
     """One without fused multiplication and addition, as far as the C library goes."""

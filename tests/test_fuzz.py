@@ -254,7 +254,7 @@ def test_a_command_ends_in_a_result_or_says_why_not(
         ended = confined.run(words, folder)
         event(f"{words[0]}: {ended.code}")
         assert _fault(ended) == "", f"{words}: {ended.code}\n{ended.stderr}"
-        apart = ("out", "run", "bare") if words[0] in ("run", "export") else ("out",)  # export keeps the table there
+        apart = ("out", "run", "bare") if words[0] == "run" else ("out",)
         assert _listing(folder, *apart) == {k: v for k, v in before.items() if k.split("/")[0] not in apart}
 
 

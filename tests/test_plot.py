@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from harness.drawing import COLOURS
 from harness.log import FlightLog
 from harness.log.figure import PANELS, command_spectrum, picture
-from harness.log.metric import Signals
+from harness.log.signals import Signals
 from harness.loop import simulate
 from harness.plants.plant import Outcome
 from harness.runs.results import load_results

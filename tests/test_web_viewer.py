@@ -4,9 +4,7 @@ import asyncio
 import base64
 import io
 import json
-import os
 import re
-import shutil
 import signal
 import subprocess
 import time
@@ -16,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-import pytest
 from matplotlib.image import imread
 from tornado.websocket import websocket_connect
 
 import harness
 from harness.review.viewer import free_port
-from tests.builders import SIXDOF, invoke, words_of
+from tests.builders import SIXDOF, chromium, invoke, words_of
 
 ORANGE = (1.0, 0.57, 0.13)  # of the 6-DOF flight, within 0.1
 LEAST = 600  # pixels: some 100 are those of a warning that nothing but a processor draws here
@@ -30,14 +27,10 @@ LEAST = 600  # pixels: some 100 are those of a warning that nothing but a proces
 
 def screenshot(address: str, folder: Path) -> Any:
     """The browser's picture of the page once it shows the flight's colour; the last one after a minute."""
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        assert not os.environ.get("CI"), "no Chromium to open the page with"
-        pytest.skip("no Chromium to open the page with")
     port = free_port()
     browser = subprocess.Popen(
         [
-            chromium, "--headless=new", "--no-sandbox", f"--user-data-dir={folder}", "--no-first-run",
+            chromium(), "--headless=new", "--no-sandbox", f"--user-data-dir={folder}", "--no-first-run",
             "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
             "--window-size=1200,800", f"--remote-debugging-port={port}", address,
         ],

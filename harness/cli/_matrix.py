@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._input import BadInput
 from harness.cli._progress import busy, duration, of_run
 
 if TYPE_CHECKING:
@@ -18,6 +20,15 @@ if TYPE_CHECKING:
 _MOST_LINES = 60  # of the table of results
 _MOST_REASONS = 5
 _MOST_WARNINGS = 10
+
+
+def processes(workers: int | None, flight_timeout: float | None) -> int:
+    """The number of workers: one per processor unless told. BadInput for a time limit that cannot be kept."""
+    if flight_timeout is not None and not flight_timeout > 0:
+        raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
+    if flight_timeout is not None and workers == 0:
+        raise BadInput("--flight-timeout needs a worker to end: --workers must be at least 1")
+    return (os.cpu_count() or 1) if workers is None else workers
 
 
 def surveyed(matrix: Matrix, limit: int | None = None, done: Collection[int] = ()) -> Survey:

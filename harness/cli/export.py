@@ -39,13 +39,14 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
 
     table, name = _table(what, flight)
     path = writable(out or Path(f"{name}.{kind}"))
-    with replacing(path) as partial, partial.open("wb") as file:
-        if kind == "parquet" and Path(what).is_dir():
-            file.write(write_table(Path(what)).read_bytes())  # its columns say their units
-        elif kind == "csv":
-            table.to_csv(file, index=False)
-        else:
-            table.to_parquet(file, index=False)
+    if kind == "parquet" and Path(what).is_dir():
+        write_table(Path(what), path)  # its columns say their units
+    else:
+        with replacing(path) as partial, partial.open("wb") as file:
+            if kind == "csv":
+                table.to_csv(file, index=False)
+            else:
+                table.to_parquet(file, index=False)
     click.echo(f"{path}: {len(table)} rows, {len(table.columns)} columns")
 
 

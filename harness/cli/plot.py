@@ -82,14 +82,14 @@ def _map(folder: Path, metric: str, where: tuple[str, ...]) -> tuple[Picture, st
     from harness.runs.store import StoreError
     from harness.settings import SettingsError
     from harness.verdict import figures, grid
-    from harness.verdict.following import with_following
+    from harness.verdict.following import with_margins
     from harness.verdict.pairs import CompareError, axes, entered, spread
 
     if not folder.is_dir():
         raise BadInput(f"{folder}: must be a folder that `harness run` wrote")
     try:
         flights, assess, *_ = comparable([folder])
-        table = entered(with_following(chosen(flights, wanted(where))), assess.circling_error)
+        table = entered(with_margins(chosen(flights, wanted(where))), assess.circling_error)
         varies = axes(spread(table))
         grids = grid.maps(table, varies, metric)
     except (StoreError, SettingsError, CompareError) as error:

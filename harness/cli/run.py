@@ -53,10 +53,8 @@ def run(
       harness run experiments/wind.toml --out out/wind --retry failed
       harness run experiments/stationary.toml --out out/k2 --set 'law.k2=[1,3,12]' --set 'seed={start=0,count=8}'
     """
-    import os
-
     from harness.cli._input import BadInput
-    from harness.cli._matrix import fly_matrix, print_survey, print_time, surveyed
+    from harness.cli._matrix import fly_matrix, print_survey, print_time, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.runs.matrix import read_matrix
     from harness.runs.run import Options, positions_done
@@ -66,11 +64,7 @@ def run(
 
     if out is None and not dry_run:
         raise BadInput("--out DIR is missing: the folder of the results")
-    if flight_timeout is not None and not flight_timeout > 0:
-        raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
-    if flight_timeout is not None and workers == 0:
-        raise BadInput("--flight-timeout needs a worker to end: --workers must be at least 1")
-    workers = (os.cpu_count() or 1) if workers is None else workers
+    workers = processes(workers, flight_timeout)
     try:
         matrix = read_matrix(read_settings(file, overrides), draft=True)
         done = positions_done(matrix, out, retry_failed=retry is not None) if out else {}

@@ -75,10 +75,8 @@ def tune(
       harness tune experiments/tune.toml --out out/front --over law.k2=0.5:20 \\
           --minimise range_error_peak_m --minimise convergence_time_s --subject-to 'range_error_peak_m < 5'
     """
-    import os
-
     from harness.cli._input import BadInput
-    from harness.cli._matrix import flown_out, print_survey, surveyed
+    from harness.cli._matrix import flown_out, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
@@ -91,11 +89,7 @@ def tune(
     from harness.search.tune import tuning
     from harness.settings import read_settings
 
-    if flight_timeout is not None and not flight_timeout > 0:
-        raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
-    if flight_timeout is not None and workers == 0:
-        raise BadInput("--flight-timeout needs a worker to end: --workers must be at least 1")
-    workers = (os.cpu_count() or 1) if workers is None else workers
+    workers = processes(workers, flight_timeout)
     try:
         space = Space(read_settings(file, overrides), [dimension(text) for text in over])
         asked = _requirements(required)

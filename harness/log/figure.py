@@ -20,7 +20,7 @@ from harness.drawing import COLOURS, COLUMN, FAINT, INK, PAGE, Picture
 from harness.drawing import picture as drawn
 from harness.error import ArgumentError, did_you_mean
 from harness.log.flight_log import FlightLog
-from harness.log.metric import Signals
+from harness.log.signals import Signals
 from harness.plants.plant import Outcome
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from harness.chatter import spectrum
-from harness.log.metric import Signals
+from harness.log.signals import Signals
 from harness.review.recorder import Recorder
 from harness.review.styled import GREY, TARGET, WIND, Colour, StyledFlight, is_crowd, mixed
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import aircraft
 from harness.chatter import swinging
 from harness.log import FlightLog
-from harness.log.metric import Signals
+from harness.log.signals import Signals
 from harness.plants.plant import Outcome
 from harness.review.styled import Colour
 

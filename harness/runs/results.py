@@ -49,19 +49,18 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     return as_results(_declared(table).to_pandas())
 
 
-def export(folder: Path) -> Path:
-    """Writes the table to flights.parquet, unless no flight was added since; the file is complete or unchanged."""
+def export(folder: Path, to: Path | None = None) -> None:
+    """Writes the table to flights.parquet or `to`, unless it is there already; the file is complete or unchanged."""
     import pyarrow.parquet as pq
 
-    path = folder / PARQUET
+    path = to or folder / PARQUET
     with reading(folder) as journal:
         now = state(journal)
         if _is_current(path, now):
-            return path
+            return
         table = _declared(_table(journal)).replace_schema_metadata({_STATE: now})
     with replacing(path) as partial, partial.open("wb") as file:
         pq.write_table(table, file, row_group_size=10 * _AT_ONCE)  # one group of all takes more memory
-    return path
 
 
 def _is_current(path: Path, now: str) -> bool:

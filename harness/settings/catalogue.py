@@ -1,8 +1,8 @@
 """Every key of a settings file in words, read from the declarations: for `harness list` and the reference."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
-from types import EllipsisType
+from types import EllipsisType, MappingProxyType
 from typing import Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -34,6 +34,7 @@ UNITS = {
 }
 REQUIRED = "–"  # instead of a default
 TRUTH = "true or false"
+_KINDS: Mapping[object, str] = MappingProxyType({float: "number", int: "whole number", str: "text", bool: TRUTH})
 _BOUNDS = {Gt: ">", Ge: "≥", Lt: "<", Le: "≤"}
 
 
@@ -118,7 +119,7 @@ def _in_file(value: object, unit: Unit) -> object:
 
 def _allowed(setting: Setting) -> str:
     """What a value may be, in words."""
-    kind = {float: "number", int: "whole number", str: "text", bool: TRUTH}.get(setting.kind, "table")  # type: ignore[call-overload]
+    kind = _KINDS.get(setting.kind, "table")
     bounds = " and ".join(f"{_BOUNDS[type(b)]} {_plain(getattr(b, type(b).__name__.lower()))}" for b in setting.bounds)
     words = f"{kind} {bounds}".strip()
     if setting.infinite:

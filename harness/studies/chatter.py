@@ -20,7 +20,7 @@ from autopilot.laws import law
 from harness.chatter import FEWEST_CYCLES, LEAST_CORRELATION, REMEMBERED, SHORTEST, SLOWEST, VISIBLE
 from harness.flight import Flight
 from harness.limit_cycle.prediction import Loop, boundary
-from harness.log.metric import Signals
+from harness.log.signals import Signals
 from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.plant import Start

@@ -11,7 +11,7 @@ from harness.log.metric import METRICS
 from harness.margins import Assess
 from harness.plants.ladder import BASELINE
 from harness.verdict.conditions import Conclusion, conclude
-from harness.verdict.following import with_following
+from harness.verdict.following import with_following, with_margins
 from harness.verdict.judgement import Judgement, frame, judged
 from harness.verdict.pairs import (
     FAILED,
@@ -171,7 +171,7 @@ def compare_flights(
         values = ordered(flights[by])
         baseline = BASELINE if by == "plant" else values[0]
     assumption = by == "plant" and shown(baseline) == BASELINE
-    table = with_shares(entered(with_following(flights), assess.circling_error))
+    table = with_shares(entered((with_following if assumption else with_margins)(flights), assess.circling_error))
     paired = pairs_by(table, by, baseline)
     failed = table["outcome"].isin(FAILED)
     return Comparison(

@@ -5,46 +5,59 @@ airframe, for an airframe that is not identified at the flight's airspeed, and f
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from harness.error import HarnessError
-from harness.limit_cycle.predicted import PREDICTED, predicted
+from harness.flight import Flight
+from harness.limit_cycle.predicted import MARGIN, PREDICTED, predicted, predicted_margin
 from harness.plants.ladder import PLANTS
 from harness.settings import flight_from_document
 from harness.settings.columns import is_setting, nested
 from harness.verdict.pairs import joined
 
-_UNKNOWN = (math.nan,) * len(PREDICTED)
-
 
 def with_following(flights: pd.DataFrame) -> pd.DataFrame:
     """The flights with `PREDICTED`; flights of equal law, airframe, airspeed and period are predicted once."""
+    return _with(flights, PREDICTED, lambda flight: list(predicted(flight).values()))
+
+
+def with_margins(flights: pd.DataFrame) -> pd.DataFrame:
+    """The same with the margin to the limit cycle alone, in a third of the time."""
+    return _with(flights, [MARGIN], lambda flight: [predicted_margin(flight)])
+
+
+def _with(
+    flights: pd.DataFrame, columns: Collection[str], numbers: Callable[[Flight], Sequence[float | None]]
+) -> pd.DataFrame:
     keys = ["aircraft", "start.airspeed_mps", "guidance_period_s"]
     keys += [column for column in flights.columns if column.startswith("law.")]
     texts = joined(flights, [key for key in keys if key in flights])
     has_airframe = [PLANTS[plant].has_airframe for plant in flights["plant"]]
     rows = [text if of_airframe else "" for text, of_airframe in zip(texts, has_airframe, strict=True)]
-    known: dict[str, tuple[float, ...]] = {"": _UNKNOWN}
+    unknown = [math.nan] * len(columns)
+    known = {"": unknown}
     for position, text in enumerate(rows):
         if text not in known:
-            known[text] = _predicted(flights.iloc[position].to_dict())
-    table = np.array([known[text] for text in rows], np.float64).reshape(-1, len(PREDICTED))
-    return flights.assign(**{name: table[:, i] for i, name in enumerate(PREDICTED)})
+            flight = _flight(flights.iloc[position].to_dict())
+            found = unknown if flight is None else [math.nan if x is None else x for x in numbers(flight)]
+            known[text] = found
+    table = np.array([known[text] for text in rows], np.float64).reshape(-1, len(columns))
+    return flights.assign(**{name: table[:, i] for i, name in enumerate(columns)})
 
 
-def _predicted(row: Mapping[Any, Any]) -> tuple[float, ...]:
+def _flight(row: Mapping[Any, Any]) -> Flight | None:
+    """A flight that is predicted as that of the row; None if its settings serve no more."""
     settings = {str(key): value for key, value in row.items() if is_setting(str(key)) and _is_there(value)}
     keep = ("plant", "aircraft", "guidance_period_s", "start.airspeed_mps")
     chosen = {key: value for key, value in settings.items() if key in keep or key.startswith("law.")}
     try:
-        flight = flight_from_document(nested({**chosen, "duration_s": 100.0 * settings["guidance_period_s"]}))
+        return flight_from_document(nested({**chosen, "duration_s": 100.0 * settings["guidance_period_s"]}))
     except (HarnessError, OSError):
-        return _UNKNOWN
-    return tuple(math.nan if number is None else number for number in predicted(flight).values())
+        return None
 
 
 def _is_there(value: object) -> bool:

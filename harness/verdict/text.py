@@ -18,7 +18,7 @@ def lines(comparison: Comparison, mapped: str | None = None) -> Iterator[str]:
         yield from grid.lines(_maps(comparison, mapped))
         return
     maps = list(grid.lines(grid.answering(comparison)))
-    if len(flown.combinations(comparison)[1]) > flown.MOST_LINES and maps:
+    if maps and len(flown.combinations(comparison)[1]) > flown.MOST_LINES:
         yield from maps
         yield "A line for each combination: `harness show`, and the page of `harness report`."
     else:

@@ -16,6 +16,7 @@ from harness.error import HarnessError
 HEADER = ("time_s", "north_m", "east_m")
 FEWEST = 4  # rows: as many as determine a cubic
 LARGEST = 1e9  # s or m
+SOONEST = 1e-6  # s from row to row: closer, the cubic has no finite coefficients
 
 _SLOWEST = 1e-6  # m/s: a slower target has no direction
 _Row = tuple[float, float, float]
@@ -96,6 +97,10 @@ def _rows(path: Path, text: str) -> list[_Row]:
             if rows and row[0] <= rows[-1][0]:
                 how = "is given twice" if row[0] == rows[-1][0] else f"comes after {rows[-1][0]:g}"
                 raise ValueError(f"time_s {row[0]:g} {how}, must increase from row to row")
+            if rows and row[0] - rows[-1][0] < SOONEST:
+                raise ValueError(
+                    f"time_s comes {row[0] - rows[-1][0]:g} s after the row before, must be at least {SOONEST:g} s"
+                )
             if not rows and row[0] > 0.0:
                 raise ValueError(f"the track begins at {row[0]:g} s, must begin at 0 or before, as the flight does")
         except ValueError as error:
