@@ -93,8 +93,8 @@ ROWS = ["0,0,0", "1,1,0", "2,2,0", "3,3,0"]
         ([HEADER, *ROWS[:2], "0.5,2,0", *ROWS[2:]], ":4: time_s 0.5 comes after 1, must increase from row to row"),
         ([HEADER, *ROWS[:3], ROWS[2], ROWS[3]], ":5: time_s 2 is given twice, must increase from row to row"),
         (
-            [HEADER, ROWS[0], "1e-320,1,0", *ROWS[2:]],
-            ":3: time_s comes 9.99989e-321 s after the row before, must be at",
+            [HEADER, ROWS[0], "1e-9,1,0", *ROWS[2:]],
+            ":3: time_s comes 1e-09 s after the row before, must be at least 1e-06 s",
         ),
         ([HEADER, ROWS[0], "1,,0", *ROWS[2:]], ":3: north_m is missing"),
         ([HEADER, ROWS[0], "", *ROWS[2:]], ":3: no numbers, must be 3: time_s, north_m, east_m"),
