@@ -44,6 +44,22 @@ FLIGHT = Flight(plant="kinematic", law=law("nftsm", "paper_1"), duration=20.0)  
 SIXDOF = replace(FLIGHT, plant="sixdof")
 
 
+MATRIX = """\
+title = "A title"
+question = "A question?"
+[flight]
+plant = "kinematic"
+duration_s = 2.0
+[flight.law]
+name = "nftsm"
+gains = "paper_1"
+[matrix]
+plant = ["kinematic", "sixdof"]
+"start.heading_deg" = { uniform = [0.0, 90.0] }
+seed = { start = 0, count = 5 }
+"""
+
+
 @dataclass(frozen=True)
 class OwnLaw:
     """A law of a test's own: `make` starts it."""

@@ -1,0 +1,137 @@
+"""What decides a flight beside its settings: files by their content, whose change makes another flight and is told."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import harness
+from harness.runs.results import versions
+from tests.builders import (
+    MATRIX,
+    ROOT,
+    command,
+    copied_airframe,
+    digests,
+    fly_matrix,
+    invoke,
+    words_of,
+    write,
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return write(tmp_path / "matrix.toml", MATRIX)
+
+
+def test_a_moved_or_linked_project_with_its_own_airframe_keeps_its_keys(tmp_path: Path) -> None:
+    project, moved, link = tmp_path / "project", tmp_path / "moved", tmp_path / "link"
+    project.mkdir()
+    copied_airframe("aerosonde", project / "mine")
+    text = MATRIX.replace("duration_s", 'aircraft = "mine"\nduration_s').replace("count = 5", "count = 1")
+    write(project / "matrix.toml", text)
+    fly_matrix(project / "matrix.toml", project / "out")
+    before = digests(project / "out")
+    link.symlink_to(project)
+    assert fly_matrix(link / "matrix.toml", project / "out").earlier == len(before) == 2
+    link.unlink()
+    project.rename(moved)
+    assert fly_matrix(moved / "matrix.toml", moved / "out").earlier == 2
+    assert digests(moved / "out") == before
+    data = moved / "mine" / "airframe.toml"
+    data.write_text(data.read_text() + "\n# changed\n")
+    assert fly_matrix(moved / "matrix.toml", moved / "out").done == 2
+
+
+def test_rows_of_another_version_are_marked(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out"
+    fly_matrix(file, out, "seed=0")
+    assert "*" not in invoke("show", out).stdout
+    monkeypatch.setattr("harness.key.PHYSICS_VERSION", 99)
+    fly_matrix(file, out, "seed=1")
+    lines = invoke("show", out).stdout.splitlines()
+    results = harness.load_results(out)
+    for key, seed in zip(results["key"], results["seed"], strict=True):
+        assert any(line.startswith(f"{key[:8]}{'*' if seed == 0 else ' '}") for line in lines)
+    assert lines[-1].startswith("* flown by another version: physics ")
+    assert lines[-1].endswith(" (here 99); the same command flies it anew")
+
+
+def append(path: Path, text: str) -> None:
+    path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
+
+
+@pytest.fixture
+def own_copy(tmp_path: Path) -> Path:
+    """A folder with copies of the packages, in which files may be edited: a Python started there uses them."""
+    for package in ("harness", "autopilot", "aircraft"):
+        shutil.copytree(ROOT / package, tmp_path / "copy" / package, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "copy"
+
+
+def in_copy(copy: Path, *words: object) -> str:
+    """The command, of the copy: of `run` what it flew, else its last line."""
+    done = subprocess.run(
+        words_of(*words),
+        cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-2] if words[0] == "run" else done.stderr.splitlines()[-1]
+
+
+def test_an_edited_law_inner_loop_airframe_or_track_is_a_new_flight_and_a_mix_is_told(
+    own_copy: Path, tmp_path: Path
+) -> None:
+    track = own_copy / "track.csv"
+    track.write_text("time_s,north_m,east_m\n" + "".join(f"{t},{t},0\n" for t in range(5)))
+    file, out = own_copy / "m.toml", tmp_path / "out"
+    file.write_text(
+        '[flight]\nduration_s = 1.0\n[flight.law]\nname = "smc"\n[flight.target]\ntrack = "track.csv"\n'
+        '[matrix]\nplant = ["kinematic", "sixdof"]\n'
+    )
+    run_it = ("run", file, "--out", out, "--workers", 0, "--log", "none")
+    assert in_copy(own_copy, *run_it).startswith("2 flown, 0 earlier")
+    edits = [  # a file, what is added to it, how many of the flights are new
+        (own_copy / "autopilot" / "smc.py", "\n# another law\n", 2),
+        (own_copy / "autopilot" / "inner_loop.xml", "<!-- another loop -->\n", 1),
+        (own_copy / "aircraft" / "ultra_stick_25e" / "ultra_stick_25e.xml", "<!-- another airframe -->\n", 1),
+        (track, "5,9,0\n", 2),
+    ]
+    assert {len(counts) for counts in versions(out).values()} == {1}
+    for path, text, new in edits:
+        append(path, text)
+        assert in_copy(own_copy, *run_it).startswith(f"{new} flown, {2 - new} earlier"), path
+        assert in_copy(own_copy, *run_it).startswith("0 flown, 2 earlier"), path
+    mixed = {what: counts for what, counts in versions(out).items() if len(counts) > 1}
+    assert list(mixed) == [
+        "autopilot/smc.py",
+        f"the track {track}",
+        "autopilot/inner_loop.xml",
+        "aircraft/model of ultra_stick_25e",
+    ]
+    assert list(mixed["autopilot/smc.py"].values()) == [2, 6]
+    refused = command("compare", out)
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert "of different versions, which a comparison must not mix: autopilot/smc.py has 2 versions, of 2 and" in line
+
+
+def test_a_row_of_another_version_is_flown_with_a_warning_that_has_the_largest_deviation(
+    own_copy: Path, tmp_path: Path
+) -> None:
+    file, out = own_copy / "m.toml", tmp_path / "out"
+    file.write_text('[flight]\nplant = "kinematic"\nduration_s = 10.0\n[flight.law]\nname = "smc"\n')
+    in_copy(own_copy, "run", file, "--out", out, "--workers", 0)
+    (key,) = harness.load_results(out)["key"]
+    law = own_copy / "autopilot" / "smc.py"
+    again = ("fly", f"{out}:{key[:5]}", "--json")
+    assert in_copy(own_copy, *again).endswith("to the last bit")
+    append(law, "\n# another text of the same law\n")
+    assert in_copy(own_copy, *again).endswith("to the last bit")
+    law.write_text(law.read_text().replace("c1 * atan(", "1.001 * c1 * atan("))
+    told = in_copy(own_copy, *again)
+    assert told.startswith("warning: differs from the stored flight (changed since: autopilot/smc.py): ")
+    assert "at the end differs by" in told
