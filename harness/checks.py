@@ -145,4 +145,5 @@ def _target_problems(flight: Flight) -> list[Problem]:
 
 
 def _is_multiple(period: float, unit: float) -> bool:
-    return round(period / unit) >= 1 and math.isclose(round(period / unit) * unit, period, rel_tol=1e-9)
+    times = period / unit
+    return math.isfinite(times) and round(times) >= 1 and math.isclose(round(times) * unit, period, rel_tol=1e-9)

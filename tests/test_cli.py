@@ -309,6 +309,8 @@ def test_the_experiment_to_start_from_checks_and_runs_as_it_is_and_with_all_that
     assert "exclude" in everything
     again = invoke("init", file)
     assert (again.exit_code, again.stderr) == (2, f"{file}: exists already; choose another name\n")
+    inside = invoke("init", tmp_path)
+    assert (inside.exit_code, inside.stderr) == (2, f"{tmp_path}: is a folder, must be the name of a file\n")
 
 
 def test_a_long_path_is_never_cut(file: Path, tmp_path: Path) -> None:

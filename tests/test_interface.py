@@ -174,6 +174,7 @@ def test_whole_numbers_and_floats_are_the_same_flight() -> None:
         (replace(FLIGHT, law=harness.law("nftsm", "paper_1", k2=-1.0)), "flight.law.k2: is -1.0, must be a number > 0"),
         (replace(FLIGHT, law="nftsm"), "flight.law: is 'nftsm', must be a law"),  # type: ignore[arg-type]
         (replace(FLIGHT, wind=(3.0, 0.0)), r"flight.wind: is \(3.0, 0.0\), must be a harness.Wind"),  # type: ignore[arg-type]
+        (replace(FLIGHT, guidance_period=1e-320), "flight.guidance_period_s: .* is not a whole multiple"),
         (replace(FLIGHT, guidance_period=0.0512), "flight.guidance_period_s: 0.0512 s is not a whole multiple"),
         ("stationary.toml", "must be a harness.Flight"),
     ],

@@ -28,6 +28,8 @@ def init(name: Path) -> None:
     from harness.files import write_text
     from harness.toml_text import shown
 
+    if name.is_dir():
+        raise BadInput(f"{name}: is a folder, must be the name of a file")
     file = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
     if file.exists():
         raise BadInput(f"{file}: exists already; choose another name")

@@ -86,7 +86,7 @@ def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
         loaded = fdm.load_planet(_text(_PLANTS / "planet.xml"), False) and fdm.load_model_with_paths(
             _text(Path(airframe.name)), _text(airframe.parent), _text(airframe), _text(_INNER_LOOP), True
         )
-    except jsbsim.BaseError as error:
+    except RuntimeError as error:  # also what the C++ library throws besides JSBSim's own BaseError
         raise ModelError(f"{aircraft.model(airframe)}: {' '.join(str(error).split())}") from error
     if not loaded or _load_log.problems:
         raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
