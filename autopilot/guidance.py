@@ -1,7 +1,11 @@
 """The interface of a guidance law: its observation and its guidance."""
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple, Protocol
+from inspect import signature
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+
+if TYPE_CHECKING:
+    from autopilot.response import Response
 
 
 class Observation(NamedTuple):
@@ -31,6 +35,7 @@ class Observation(NamedTuple):
     target_velocity_east: float
     target_acceleration: float  # rate of the target's speed
     target_turn_rate: float
+    time: float = 0.0  # since the start of the flight
 
 
 class Guidance(NamedTuple):
@@ -51,8 +56,25 @@ class Guidance(NamedTuple):
 LawStep = Callable[[Observation], Guidance]
 
 
+class Context(NamedTuple):
+    """What a law knows before it flies. SI, rad."""
+
+    period: float = 0.05  # between two commands
+    nominal_airspeed: float = 13.0  # commanded
+    seed: int = 0  # of the flight, for a law that draws
+    response: "Response | None" = None  # identified, of the heading rate to its command; None when unknown
+    at_once: bool = False  # whether the plant follows the command at once: there is nothing to predict
+
+
+UNKNOWN = Context()  # for a law that asks for nothing
+
+
 class Law(Protocol):
-    """A guidance law: a frozen value of parameters. Any memory belongs to the function that `start` returns."""
+    """A guidance law: a frozen value of parameters. Any memory belongs to the function that `start` returns.
+
+    A law that computes with `Context.response` says so by `uses_response = True` in its class; to others it is None,
+    so that their flights do not depend on the identification.
+    """
 
     @property
     def standoff(self) -> float: ...
@@ -63,10 +85,20 @@ class Law(Protocol):
         """The quantity to which the limit applies."""
         ...
 
-    def start(self) -> LawStep:
+    def start(self, context: Context) -> LawStep:
         """The law in flight, without memory of any other flight."""
         ...
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """Sentences on the conditions of its theory that the gains violate; `speed_ratio` is (v_t + v_w) / v_a."""
         ...
+
+
+def started(law: Law, context: Context) -> LawStep:
+    """The law in flight; one whose `start` takes nothing is started without the context."""
+    return law.start(context) if signature(law.start).parameters else law.start()  # type: ignore[call-arg]
+
+
+def uses_response(law: Law) -> bool:
+    """Whether the law computes with the identified response of its airframe."""
+    return bool(getattr(law, "uses_response", False))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from autopilot.guidance import LawStep
+from autopilot.guidance import UNKNOWN, Context, LawStep
 from autopilot.quantities import About
 from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
 
@@ -38,7 +38,7 @@ class Nftsm(StandoffLaw):
     k3: Annotated[float, Ge(0), About("1/s: power reaching gain, Eq. (18)")]
     gamma1: Annotated[float, Gt(0), Lt(1), About("power of the reaching law, Eq. (18)")]
 
-    def start(self) -> LawStep:
+    def start(self, context: Context = UNKNOWN) -> LawStep:
         return standoff_step(self, reaching(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from annotated_types import Gt
 
-from autopilot.guidance import LawStep
+from autopilot.guidance import UNKNOWN, Context, LawStep
 from autopilot.quantities import About
 from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
 
@@ -26,7 +26,7 @@ class Smc(StandoffLaw):
     c3: Annotated[float, Gt(0), About("rad/s: reaching gain, Eq. (35)")]
     epsilon: Annotated[float, Gt(0), About("rad: half width of the boundary layer, Eq. (35)")]
 
-    def start(self) -> LawStep:
+    def start(self, context: Context = UNKNOWN) -> LawStep:
         return standoff_step(self, reaching(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:

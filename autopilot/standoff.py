@@ -4,9 +4,10 @@ Symbols are the paper's: L distance, R_d standoff distance, r range error, theta
 target, lam = theta - pi/2; a bar is an angle minus lam. Pure functions of floats, finite for finite arguments.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import asin, atan2, copysign, cos, hypot, pi, radians, sin, sqrt
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt
@@ -29,7 +30,7 @@ def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Mot
 
     With lam = theta - pi/2, v sin(psi - lam) is a velocity away from the target, v cos(psi - lam) the one along lam.
     """
-    x, y, _, _, _, _, _, _, _, _, W_x, W_y, x_t, y_t, v_t_x, v_t_y, a_t, omega_t = o
+    x, y, _, _, _, _, _, _, _, _, W_x, W_y, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, _ = o
     x_r, y_r = x - x_t, y - y_t
     L = sqrt(x_r * x_r + y_r * y_r)
     lam = atan2(y_r, x_r) - 0.5 * pi
@@ -86,6 +87,14 @@ def holding_course_rate(R_d: float, v_a: float, W_x: float, W_y: float, v_t_x: f
     return most
 
 
+_SLOWEST = 1e-3  # m/s: no airspeed that a law computes with is smaller
+AIRSPEEDS: Mapping[str, Callable[[Observation], float]] = MappingProxyType(  # the v_a of a law, by its setting
+    {
+        "nominal": lambda o: o.nominal_airspeed,
+        "measured": lambda o: max(o.airspeed, _SLOWEST),
+        "ground": lambda o: max(hypot(o.velocity_north - o.wind_north, o.velocity_east - o.wind_east), _SLOWEST),
+    }
+)
 _guidance = Guidance._make  # from a tuple, in half the time of the constructor
 Reaching = Callable[[Motion], tuple[float, float, float]]  # feed-forward, rest of the command, s
 
@@ -101,7 +110,10 @@ class StandoffLaw:
     direction: Annotated[
         Literal["paper", "mirrored"], About("sense of circling: paper is anticlockwise on a map, mirrored is clockwise")
     ] = "paper"
-    airspeed: Annotated[Literal["nominal", "measured"], About("the v_a that the law computes with")] = "nominal"
+    airspeed: Annotated[
+        Literal["nominal", "measured", "ground"],
+        About("the v_a that the law computes with; ground is |ground velocity - estimated wind|"),
+    ] = "nominal"
     command: Annotated[
         Literal["heading_rate", "course_rate"],
         About("the quantity that is limited: heading rate, or course rate by Eq. (3), which needs no air data"),
@@ -111,10 +123,10 @@ class StandoffLaw:
 def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
     """The law in flight. `reach` computes (feed-forward, rest of the command, s) for the paper's sense of circling."""
     R_d, max_rate = law.standoff, law.max_heading_rate
-    measured, by_course = law.airspeed == "measured", law.command == "course_rate"
+    airspeed, by_course = AIRSPEEDS[law.airspeed], law.command == "course_rate"
 
     def step(o: Observation) -> Guidance:
-        v_a = max(o.airspeed, 1e-3) if measured else o.nominal_airspeed
+        v_a = airspeed(o)
         psi_a, limit = o.heading, max_rate
         if by_course:
             W_x, W_y = o.wind_north, o.wind_east

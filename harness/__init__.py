@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from autopilot.estimator import Estimator
-    from autopilot.guidance import Guidance, Law, Observation
+    from autopilot.guidance import Context, Guidance, Law, Observation
     from harness.comparison import compare
     from harness.error import ArgumentError, HarnessError, RecordingError, SettingsError
     from harness.flight import Flight, InnerLoop, MetricSettings
@@ -50,6 +50,7 @@ __all__ = [
     "Assess",
     "CompareError",
     "Comparison",
+    "Context",
     "Estimator",
     "Flight",
     "FlightLog",
@@ -86,7 +87,7 @@ __all__ = [
 # Where each name lives. It is loaded when it is first asked for: `harness --help` needs none of them.
 _HOMES = {
     "autopilot.estimator": ["Estimator"],
-    "autopilot.guidance": ["Guidance", "Law", "Observation"],
+    "autopilot.guidance": ["Context", "Guidance", "Law", "Observation"],
     "harness.comparison": ["compare"],
     "harness.error": ["ArgumentError", "HarnessError", "RecordingError", "SettingsError"],
     "harness.flight": ["Flight", "InnerLoop", "MetricSettings"],

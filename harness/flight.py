@@ -1,5 +1,6 @@
 """A flight as a value: all settings that decide it."""
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -7,7 +8,7 @@ from annotated_types import Ge, Gt, Le
 
 import aircraft
 from autopilot.estimator import Estimator
-from autopilot.guidance import Law
+from autopilot.guidance import Context, Law, uses_response
 from autopilot.quantities import About, Metres, OneOf, Seconds
 from harness.plants.ladder import PLANTS, Setup
 from harness.plants.plant import Plant, Start
@@ -75,6 +76,18 @@ def setup_of(flight: Flight) -> Setup:
 def plant_of(flight: Flight) -> Plant:
     """The plant that the flight names. Raises `PlantError` when it cannot be made."""
     return PLANTS[flight.plant].make(setup_of(flight))
+
+
+def context_of(flight: Flight) -> Context:
+    """What the flight's law knows before it flies; the response of an airframe that is not identified is None."""
+    response = None
+    if uses_response(flight.law):
+        from harness.plants.identified import IdentifiedError, identified  # late: most laws need none
+
+        with suppress(IdentifiedError, FileNotFoundError):
+            response = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate
+    at_once = PLANTS[flight.plant].at_once
+    return Context(flight.guidance_period, flight.start.airspeed, flight.seed, response, at_once)
 
 
 def air_of(flight: Flight) -> Air:

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import aircraft
 import autopilot
 from autopilot.estimator import ESTIMATORS
+from autopilot.guidance import uses_response
 from harness.flight import Flight
-from harness.plants.ladder import PLANTS
+from harness.plants.ladder import PLANTS, identification_files
 from harness.settings import document
 
 PHYSICS_VERSION = 3  # of plants, wind and loop: raised whenever a change there moves a trajectory
@@ -79,7 +80,11 @@ def _read(flight: Flight) -> dict[str, Path]:
     """The files that are read anew for each flight."""
     paths = {} if flight.target.track is None else {"target/track": Path(flight.target.track)}
     kind = PLANTS[flight.plant]
-    return {**paths, **kind.files(aircraft.folder(flight.aircraft))} if kind.has_airframe else paths
+    if kind.has_airframe:
+        paths |= kind.files(aircraft.folder(flight.aircraft))
+    if uses_response(flight.law):
+        paths |= identification_files(aircraft.folder(flight.aircraft))
+    return paths
 
 
 @lru_cache(maxsize=256)

@@ -6,9 +6,9 @@ from struct import Struct
 
 import numpy as np
 
-from autopilot.guidance import Guidance, LawStep, Observation
+from autopilot.guidance import Context, Guidance, LawStep, Observation, started
 from harness.checks import problems
-from harness.flight import Flight, air_of, plant_of
+from harness.flight import Flight, air_of, context_of, plant_of
 from harness.knowledge import Estimation, perfect_estimator
 from harness.log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
 from harness.plants.plant import End, Outcome, Plant
@@ -21,11 +21,14 @@ assert State._fields[:_OWN] == Observation._fields[:_OWN]
 Watch = Callable[[float, Callable[[], FlightLog]], None]  # called with the time, s, and a function for the log so far
 
 
-def simulate(flight: Flight, watch: Watch | None = None, *, plant: Plant | None = None) -> FlightLog:
+def simulate(
+    flight: Flight, watch: Watch | None = None, *, plant: Plant | None = None, context: Context | None = None
+) -> FlightLog:
     """Flies the flight and returns its log, whatever its outcome.
 
     `watch` is called after each row of the log and may take its time. `plant` flies in place of the plant that the
-    flight names. Raises ValueError for settings that contradict each other, `PlantError` when the plant cannot start.
+    flight names, and `context` is then what its law is told of it. Raises ValueError for settings that contradict each
+    other, `PlantError` when the plant cannot start.
     """
     for problem in problems(flight):
         raise ValueError(f"{problem.name}: {problem.message}")
@@ -36,7 +39,7 @@ def simulate(flight: Flight, watch: Watch | None = None, *, plant: Plant | None 
     target = flight.target.start()
     estimation = Estimation(flight, target) if flight.estimator.filters else None
     estimator = estimation.at if estimation else perfect_estimator(flight.estimator)
-    law = flight.law.start()
+    law = started(flight.law, context or context_of(flight))
     flying = (plant or plant_of(flight)).start(flight.start, air_of(flight))
 
     table, rows = bytearray((last + 1) * _ROW_BYTES), 0
@@ -51,7 +54,7 @@ def simulate(flight: Flight, watch: Watch | None = None, *, plant: Plant | None 
             time = k * period
             state, truth = flying.state, target(time)
             estimate = estimator(k, truth)
-            observation = observe(state, nominal_airspeed, steady_wind, estimate)
+            observation = observe(state, nominal_airspeed, steady_wind, estimate, time)
             guidance = command(law, observation)
 
             _write_row(table, rows * _ROW_BYTES, time, *state, *truth, *guidance)
@@ -69,7 +72,7 @@ def simulate(flight: Flight, watch: Watch | None = None, *, plant: Plant | None 
 
 
 def observe(
-    state: State, nominal_airspeed: float, steady_wind: tuple[float, float], estimate: TargetState
+    state: State, nominal_airspeed: float, steady_wind: tuple[float, float], estimate: TargetState, time: float = 0.0
 ) -> Observation:
     """What the law gets to know: the aircraft's own state, the steady wind and the estimated target. SI, rad.
 
@@ -79,7 +82,7 @@ def observe(
     W_x, W_y = steady_wind
     if state.wind_north != W_x or state.wind_east != W_y:
         state = state._replace(heading=math.atan2(state.velocity_east - W_y, state.velocity_north - W_x))
-    return Observation._make((*state[:_OWN], nominal_airspeed, *steady_wind, *estimate))
+    return Observation._make((*state[:_OWN], nominal_airspeed, *steady_wind, *estimate, time))
 
 
 def command(law: LawStep, observation: Observation) -> Guidance:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 import aircraft
 import harness
-from autopilot.guidance import Guidance, LawStep
+from autopilot.guidance import Context, Guidance, LawStep
 from autopilot.laws import law
 from harness.cli.main import harness as command_line
 from harness.flight import Flight
@@ -69,7 +69,7 @@ class OwnLaw:
     max_heading_rate: float = math.radians(5.0)
     command: Literal["heading_rate", "course_rate"] = "heading_rate"
 
-    def start(self) -> LawStep:
+    def start(self, context: Context) -> LawStep:
         return self.make()
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:

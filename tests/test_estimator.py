@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from autopilot.estimator import Estimator, Measurement, Tracker, ekf, initial, linearised, measurement, residual
-from autopilot.guidance import Guidance, Observation
+from autopilot.guidance import UNKNOWN, Guidance, Observation
 from autopilot.laws import law
 from harness.checks import problems
 from harness.flight import MetricSettings, air_of, plant_of
@@ -190,7 +190,7 @@ def listening(heard: list[Observation]) -> OwnLaw:
 def test_the_law_sees_the_estimate_and_nothing_else_of_the_target() -> None:
     heard: list[Observation] = []
     log = simulate(replace(EKF, law=listening(heard)))
-    seen = np.array([o[-6:] for o in heard])
+    seen = np.array([o[-7:-1] for o in heard])
     names = ("target_north", "target_east", "target_velocity_north", "target_velocity_east")
     assert np.array_equal(seen[:, :4].T, [log[f"{name}_seen"] for name in names])
     assert not seen[:, 4:].any()
@@ -236,7 +236,7 @@ def test_with_the_truth_the_law_sees_the_target_as_it_is(plant: str) -> None:
 @pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
 def test_a_flight_with_the_truth_is_law_and_plant_alone_to_the_last_bit(plant: str) -> None:
     one = replace(EKF, plant=plant, estimator=Estimator())
-    log, step, target = simulate(one), one.law.start(), MOVING.start()
+    log, step, target = simulate(one), one.law.start(UNKNOWN), MOVING.start()
     flying = plant_of(one).start(one.start, air_of(one))
     for k in range(one.periods):
         guidance = command(step, observe(flying.state, one.start.airspeed, one.wind.steady, target(k * 0.05)))

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from autopilot import nftsm
 from autopilot.angles import wrap
-from autopilot.guidance import Guidance, Law, Observation
+from autopilot.guidance import UNKNOWN, Guidance, Law, Observation
 from autopilot.laws import LAWS, law
-from autopilot.standoff import course_rate_ratio, ground_speed, heading_from_course, relative_motion
+from autopilot.standoff import AIRSPEEDS, course_rate_ratio, ground_speed, heading_from_course, relative_motion
 
 V_A, R_D = 13.0, 200.0
 WIND = (0.1, 2.0)
@@ -61,7 +61,7 @@ def rate(f: Callable[[float], float], dt: float = 1e-4) -> float:
 
 
 def fly_at(o: Observation, steering: Law) -> Guidance:
-    return steering.start()(o)
+    return steering.start(UNKNOWN)(o)
 
 
 def test_range_and_azimuth_rates_are_the_derivatives_along_the_motion() -> None:
@@ -148,12 +148,11 @@ def test_the_slope_of_the_manifold_is_its_derivative_on_both_sides_of_zero_and_o
 FLYABLE = st.floats(-1e5, 1e5)
 OBSERVATIONS = st.builds(Observation, **dict.fromkeys(Observation._fields, FLYABLE))
 ANY_LAW = st.sampled_from([(name, gains) for name, kind in LAWS.items() for gains in kind.gain_sets])
-AIRSPEEDS = ("nominal", "measured")
 COMMANDS = ("heading_rate", "course_rate")
 
 
 @settings(max_examples=400)
-@given(ANY_LAW, st.sampled_from(AIRSPEEDS), st.sampled_from(COMMANDS), OBSERVATIONS, st.booleans())
+@given(ANY_LAW, st.sampled_from(sorted(AIRSPEEDS)), st.sampled_from(COMMANDS), OBSERVATIONS, st.booleans())
 def test_every_answer_is_finite_for_every_finite_observation(
     which: tuple[str, str], airspeed: str, command: str, o: Observation, at_the_target: bool
 ) -> None:
@@ -166,6 +165,14 @@ def test_every_answer_is_finite_for_every_finite_observation(
     assert all(math.isfinite(number) for number in answer)
     if command == "heading_rate":
         assert abs(answer.heading_rate) <= steering.max_heading_rate
+
+
+@pytest.mark.parametrize("direction", ["paper", "mirrored"])
+def test_ground_takes_the_airspeed_from_ground_velocity_and_estimated_wind(direction: str) -> None:
+    o = moment(0.0)._replace(velocity_north=9.0, velocity_east=-2.0, wind_north=3.0, wind_east=6.0)
+    by_ground = law("nftsm", airspeed="ground", direction=direction)
+    told = law("nftsm", direction=direction)
+    assert fly_at(o, by_ground) == fly_at(o._replace(nominal_airspeed=10.0), told) != fly_at(o, told)
 
 
 def test_the_singular_paper_set_is_finite_exactly_on_the_circle() -> None:

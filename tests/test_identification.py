@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import aircraft
+from autopilot.response import Response, plain
 from harness.cli import _progress
 from harness.identification.fit import (
     Training,
@@ -31,7 +32,6 @@ from harness.plants.coordinated import AirspeedHold
 from harness.plants.identified import document, identified, is_stale, read
 from harness.plants.lagged import Lagged
 from harness.plants.plant import Start
-from harness.plants.response import Response, plain
 from harness.plants.state import State
 from harness.world.air import Air
 from tests.builders import copied_airframe, invoke

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import aircraft
 from autopilot.laws import law
+from autopilot.response import Response, plain
 from harness.checks import problems
 from harness.feasibility import warnings
 from harness.flight import Flight, plant_of
@@ -23,7 +24,6 @@ from harness.plants.identified import identified
 from harness.plants.kinematic import Kinematic
 from harness.plants.lagged import Lagged
 from harness.plants.plant import Flying, Plant, Start
-from harness.plants.response import Response, plain
 from harness.world.air import Air
 from tests.builders import copied_airframe
 

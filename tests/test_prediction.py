@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from autopilot.guidance import Guidance, Observation
+from autopilot.response import critical_gain, plain
 from harness.chatter import VISIBLE
 from harness.identification.manoeuvres import STEP
 from harness.limit_cycle.observed import fly
-from harness.limit_cycle.prediction import Loop, boundary, critical_gain, limit_cycle
+from harness.limit_cycle.prediction import Loop, boundary, limit_cycle
 from harness.plants.lagged import Lagged
-from harness.plants.response import plain
 from harness.plants.sixdof import SixDof
 from harness.studies.limit_cycle import (
     AIRFRAMES,

@@ -28,10 +28,11 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
     from dataclasses import replace
 
     from autopilot.nftsm import Nftsm
+    from autopilot.response import critical_gain
     from harness.checks import airframe_of
     from harness.cli._input import BadInput, flight_of, read_file
     from harness.limit_cycle.margin import ENOUGH, following
-    from harness.limit_cycle.prediction import Loop, boundary, critical_gain, limit_cycle
+    from harness.limit_cycle.prediction import Loop, boundary, limit_cycle
     from harness.plants.identified import IdentifiedError, identified
 
     settings = read_file(file, overrides)

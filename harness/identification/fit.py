@@ -10,9 +10,9 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 from scipy.signal import fftconvolve, lfilter
 
+from autopilot.response import Response
 from harness.identification.manoeuvres import STEP
 from harness.plants.coordinated import AirspeedHold
-from harness.plants.response import Response
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
+from autopilot.response import Response
 from harness.identification import manoeuvres
 from harness.identification.fit import Array, Training, airspeed_change, fit, fit_airspeed, means
 from harness.identification.manoeuvres import (
@@ -27,7 +28,6 @@ from harness.identification.manoeuvres import (
 from harness.plants.coordinated import bank_command
 from harness.plants.identified import Identified, Sweep
 from harness.plants.plant import Plant, Start
-from harness.plants.response import Response
 from harness.plants.state import State
 from harness.plants.turn import rate_of_turn
 from harness.series import rms

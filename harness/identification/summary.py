@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator
 
+from autopilot.response import Response
 from harness.identification.identify import Identification
-from harness.plants.response import Response
 from harness.tables import table
 
 BOUND = 0.05  # of the command, RMS: manoeuvres with a larger error are named

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import aircraft
 from autopilot.guidance import Law
+from autopilot.response import critical_gain
 from harness.flight import Flight
-from harness.limit_cycle.prediction import Crossover, LimitCycle, Loop, boundary, critical_gain, crossover, limit_cycle
+from harness.limit_cycle.prediction import Crossover, LimitCycle, Loop, boundary, crossover, limit_cycle
 from harness.plants.identified import IdentifiedError, Sweep, identified
 
 # 1.5 is 3.5 dB. MIL-F-9490D asks 6 dB, a factor of 2, and 45 deg of a flight control system, of what its model leaves

@@ -28,7 +28,7 @@ def fly(loop: Loop, plant: Plant, duration: float = _DURATION) -> LimitCycle:
         start=Start(position=(R_d + 1.0, 0.0), heading=-0.5 * math.pi, airspeed=loop.airspeed),
         target=Target(position=(0.0, 0.0)),
     )
-    log = simulate(flight, plant=plant)
+    log = simulate(flight, plant=plant, context=loop.context)
     settled = slice(round(min(_SETTLED, 0.5 * duration) / period), -1)
     rate = np.diff(np.unwrap(log["heading"][settled])) / period
     return measured(rate, log["range_error"][settled], log["heading_rate_command"][settled], period)

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from autopilot.guidance import Law, Observation
+from autopilot.guidance import Context, Law, Observation, started
+from autopilot.response import Response, critical_gain
 from harness.chatter import VISIBLE
-from harness.plants.response import Response
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -55,6 +55,11 @@ class Loop:
     gain: float = 1.0  # times what the law commands beyond the turn of the circle: 2 is 6 dB more loop gain
 
     @property
+    def context(self) -> Context:
+        """What the law knows before it flies: here its response is the right one."""
+        return Context(self.period, self.airspeed, response=self.response)
+
+    @property
     def turn(self) -> float:
         """The heading rate on the circle in still air, in the paper's direction, rad/s."""
         return -self.airspeed / self.law.standoff
@@ -62,13 +67,13 @@ class Loop:
     def commands(self, e: Array, r: Array) -> Array:
         """The commands of the law, rad/s, at these heading errors, rad, and range errors, m; equal shapes."""
         law: Any = self.law
-        step = (replace(law, direction="paper") if hasattr(law, "direction") else law).start()
+        step = started(replace(law, direction="paper") if hasattr(law, "direction") else law, self.context)
         R_d, v_a = self.law.standoff, self.airspeed
 
         def command(e: float, r: float) -> float:
             psi = e - 0.5 * math.pi  # due north of the target, at the origin, the paper's circle goes west
             own = (R_d + r, 0.0, v_a * math.cos(psi), v_a * math.sin(psi), v_a, psi, *_UNKNOWN, v_a)
-            guidance = step(Observation._make((*own, *(0.0,) * 8)))
+            guidance = step(Observation._make((*own, *(0.0,) * 9)))
             if self.gain == 1.0:
                 return float(guidance.heading_rate)
             wanted = self.turn + self.gain * (guidance.unlimited_command - self.turn)
@@ -162,17 +167,6 @@ def _limit_cycle(loop: Loop, cycle: _Cycle) -> LimitCycle | None:
         range_mean=float(cycle.r.mean()),
         range_error=float(np.ptp(cycle.r)) / 2.0,
     )
-
-
-def critical_gain(response: Response, period: float) -> tuple[float, float]:
-    """Smallest gain, 1/s, from heading error to command that makes the sampled loop oscillate, its rad/s; or inf."""
-    omega = math.pi / period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
-    H = response.sampled(period, np.exp(1j * omega * period))[:, 0]
-    crossing = np.flatnonzero((np.sign(H.imag[1:]) != np.sign(H.imag[:-1])) & (H.real[1:] < 0.0))
-    gains = [
-        (-1.0 / float(H.real[i + 1]), float(omega[i + 1])) for i in (*crossing, len(omega) - 2) if H.real[i + 1] < 0
-    ]
-    return min(gains, default=(math.inf, math.inf))
 
 
 class Crossover(NamedTuple):

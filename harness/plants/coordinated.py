@@ -10,9 +10,9 @@ from annotated_types import Gt
 
 from autopilot.angles import wrap
 from autopilot.quantities import About
+from autopilot.response import Propagator, Response, dot, gauss
 from harness.plants.level import Level
 from harness.plants.plant import Flying, Start
-from harness.plants.response import Propagator, Response, dot, gauss
 from harness.plants.turn import GRAVITY, bank_of_turn
 from harness.world.air import Air
 

@@ -12,10 +12,10 @@ import numpy as np
 
 import aircraft
 import autopilot
+from autopilot.response import Response
 from harness.plants.coordinated import AirspeedHold, Coordinated
 from harness.plants.lagged import Lagged
 from harness.plants.plant import PlantError
-from harness.plants.response import Response
 from harness.toml_text import tables_of
 
 _NEAR = 0.05  # relative: an identification holds for airspeeds this close to its own

@@ -49,6 +49,7 @@ class PlantKind:
     about: str  # one sentence
     adds: str  # what it adds to the rung below, as a noun phrase
     make: Callable[[Setup], Plant]  # raises `PlantError`
+    at_once: bool = False  # whether the heading rate follows its command at once
     banks: bool = False  # whether it turns by banking, within the airframe's bank limit and airspeed envelope
     files: Callable[[Path], Mapping[str, Path]] = _no_files  # the files of an airframe that decide its flights, by name
     libraries: tuple[str, ...] = ()  # the distributions whose version decides its flights
@@ -88,6 +89,12 @@ def _airframe_files(airframe: Path) -> dict[str, Path]:
     return {"aircraft/model": aircraft.model(airframe), **{f"aircraft/{name}": airframe / name for name in names}}
 
 
+def identification_files(airframe: Path) -> dict[str, Path]:
+    """The file with what is identified of an airframe, by a name for its purpose; none where it is not identified."""
+    identification = aircraft.identified(airframe)
+    return {f"aircraft/{identification.name}": identification} if identification.is_file() else {}
+
+
 def _identified_files(airframe: Path) -> Mapping[str, Path]:
     identification = aircraft.identified(airframe)
     return {**_airframe_files(airframe), f"aircraft/{identification.name}": identification}
@@ -119,6 +126,7 @@ PLANTS: Mapping[str, PlantKind] = MappingProxyType(
             about="The paper's plant, Eq. (1): constant airspeed, level, the commanded heading rate followed at once.",
             adds="Eq. (1)",
             make=_kinematic,
+            at_once=True,
         ),
         "lagged": PlantKind(
             about="The heading rate follows its command with the lag of the airframe's inner loop, gain one.",

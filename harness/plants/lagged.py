@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 from autopilot.angles import wrap
+from autopilot.response import Propagator, Response, dot, gauss
 from harness.plants.level import Level
 from harness.plants.plant import Flying, Start
-from harness.plants.response import Propagator, Response, dot, gauss
 from harness.world.air import Air
 
 _NODES = 4  # of the quadrature of the position in a piece of at most 50 ms

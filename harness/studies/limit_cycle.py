@@ -16,13 +16,14 @@ from matplotlib.figure import Figure
 import aircraft
 from autopilot.laws import law
 from autopilot.nftsm import Nftsm
+from autopilot.response import critical_gain
 from harness.chatter import VISIBLE
 from harness.drawing import draw
 from harness.identification.fit import fit
 from harness.identification.identify import of_heading_rate
 from harness.identification.manoeuvres import STEP, flown, held
 from harness.limit_cycle.observed import fly
-from harness.limit_cycle.prediction import LimitCycle, Loop, boundary, critical_gain, limit_cycle
+from harness.limit_cycle.prediction import LimitCycle, Loop, boundary, limit_cycle
 from harness.plants.identified import Identified, identified
 from harness.plants.lagged import Lagged
 from harness.plants.sixdof import SixDof

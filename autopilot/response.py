@@ -11,7 +11,6 @@ from typing import Annotated, NamedTuple, Self
 import numpy as np
 from annotated_types import Ge, Gt, Lt
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from autopilot.quantities import About, Seconds
 
@@ -120,9 +119,26 @@ def _held(response: Response, period: float) -> tuple[int, Array, Array, Array]:
     system[:n, :n], system[:n, -1], system[n, :n], system[n + 1, n] = A, b, c, 1.0
     periods = math.floor(response.delay / period)
     late = response.delay - periods * period
-    before, after = expm(system * late), expm(system * (period - late))
+    before, after = _expm(system * late), _expm(system * (period - late))
     step = (after @ before)[:-1, :-1]
     return periods, step, after[:-1, -1], after[:-1, :-1] @ before[:-1, -1]
+
+
+def critical_gain(response: Response, period: float) -> tuple[float, float]:
+    """Smallest gain, 1/s, from heading error to command that makes the sampled loop oscillate, its rad/s; or inf."""
+    omega = math.pi / period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
+    H = response.sampled(period, np.exp(1j * omega * period))[:, 0]
+    crossing = np.flatnonzero((np.sign(H.imag[1:]) != np.sign(H.imag[:-1])) & (H.real[1:] < 0.0))
+    gains = [
+        (-1.0 / float(H.real[i + 1]), float(omega[i + 1])) for i in (*crossing, len(omega) - 2) if H.real[i + 1] < 0
+    ]
+    return min(gains, default=(math.inf, math.inf))
+
+
+def _expm(matrix: Array) -> Array:
+    from scipy.linalg import expm  # late: it takes a tenth of a second
+
+    return np.asarray(expm(matrix))
 
 
 def plain(delay: float, frequency: float, damping: float) -> Response:
@@ -210,7 +226,7 @@ class Propagator:
         if length not in self._pieces:
             count = -(-length // LONGEST)
             h, n = 1e-9 * length / count, self._order
-            ways = [np.delete(expm(self._system * (share * h)), n, axis=1) for share in (*self._nodes, 1.0)]
+            ways = [np.delete(_expm(self._system * (share * h)), n, axis=1) for share in (*self._nodes, 1.0)]
             outputs = [_row(np.array(self._output) @ way[:n]) for way in ways[:-1]]
             integrals, end = [_row(way[n]) for way in ways], [_row(row) for row in ways[-1][:n]]
             self._pieces[length] = count, Piece(h, tuple(outputs), tuple(integrals), tuple(end))
