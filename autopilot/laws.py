@@ -9,22 +9,35 @@ from typing import NamedTuple
 
 from autopilot import nftsm, smc
 from autopilot.guidance import Law
+from autopilot.rules import Rule
 
 
 class LawKind(NamedTuple):
-    """A law's class and its gain sets."""
+    """A law's class and its gain sets: those with numbers, and those that follow from a rule."""
 
     value: type[Law]
     gain_sets: Mapping[str, Mapping[str, float]]
     default: str  # the gain set of a law that names none: one with which it converges
+    rules: Mapping[str, Rule] = MappingProxyType({})
     former_names: Mapping[str, str] = MappingProxyType({})  # of gain sets: still read, with a warning
+
+    @property
+    def sets(self) -> list[str]:
+        """The names of all gain sets."""
+        return [*self.gain_sets, *self.rules]
+
+    def numbers(self, gains: str) -> Mapping[str, float]:
+        """The numbers of a gain set; of a rule those that it starts from. Of any other set there are none."""
+        return self.gain_sets.get(self.rules[gains].base if gains in self.rules else gains, {})
 
 
 LAWS: Mapping[str, LawKind] = MappingProxyType(
     {
         # The set `paper` is what Table 2 prints for NFTSM, and never converges: see docs/answers/fitted.md.
-        "nftsm": LawKind(nftsm.Nftsm, nftsm.GAIN_SETS, "fitted", MappingProxyType({"identified": "fitted"})),
-        "smc": LawKind(smc.Smc, smc.GAIN_SETS, "paper"),
+        "nftsm": LawKind(
+            nftsm.Nftsm, nftsm.GAIN_SETS, "fitted", nftsm.RULES, MappingProxyType({"identified": "fitted"})
+        ),
+        "smc": LawKind(smc.Smc, smc.GAIN_SETS, "paper", smc.RULES),
     }
 )
 
@@ -35,7 +48,8 @@ def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
     `parameters` override single gains and what all laws have: `standoff` (m), `max_heading_rate` (rad/s, not degrees),
     `direction`, `airspeed`, `command`. `harness list laws` shows all of them.
 
-    Raises ValueError for a law, a gain set or a parameter that there is not, with those that there are; FutureWarning
+    Raises ValueError for a law, a gain set or a parameter that there is not, with those that there are, and for a gain
+    set that follows from a flight by a rule; FutureWarning
     for the former name of a gain set.
 
     >>> harness.law("nftsm")
@@ -48,13 +62,15 @@ def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
     if gains in kind.former_names:
         warnings.warn(renamed(gains, kind.former_names[gains]), FutureWarning, stacklevel=2)
         gains = kind.former_names[gains]
-    if gains not in kind.gain_sets:
-        raise ValueError(_unknown(f"gain set of {name}", gains, kind.gain_sets))
+    if gains not in kind.sets:
+        raise ValueError(_unknown(f"gain set of {name}", gains, kind.sets))
     known = [parameter for parameter in signature(kind.value).parameters if parameter != "gains"]
+    if gains in kind.rules:
+        raise ValueError(f"the gain set {gains!r} of {name} follows from a flight by a rule: give the flight")
     for parameter in parameters:
         if parameter not in known:
             raise ValueError(_unknown(f"parameter of {name}", parameter, known))
-    return kind.value(**{"gains": gains, **kind.gain_sets[gains], **parameters})
+    return kind.value(**{"gains": gains, **kind.numbers(gains), **parameters})
 
 
 def _unknown(what: str, name: str, known: Collection[str]) -> str:

@@ -1,6 +1,7 @@
 """The paper's law: nonsingular fast terminal sliding mode guidance, Eq. (15)-(20)."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import asin, atan, copysign, pi
 from types import MappingProxyType
 from typing import Annotated
@@ -9,7 +10,8 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from autopilot.guidance import UNKNOWN, Context, LawStep
 from autopilot.quantities import About
-from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
+from autopilot.rules import Known, Rule, rounded
+from autopilot.standoff import PAPER_AIRSPEED, PAPER_STANDOFF, Motion, Reaching, StandoffLaw, standoff_step
 
 _TABLE_2 = {"alpha3": 0.2, "eta": 0.001, "beta3": 2.0 / 3.0, "k1": 0.05, "k2": 12.0, "k3": 6.0, "gamma1": 0.9}
 GAIN_SETS = MappingProxyType(
@@ -58,6 +60,38 @@ class Nftsm(StandoffLaw):
                 "on the manifold the aircraft may fly away from the circle"
             )
         return broken
+
+
+def behind_inner_loop(g: Nftsm, known: Known) -> Mapping[str, float]:
+    """k2 at half of where the limit cycle begins, a factor of two to spare, and k3 = k2 / 2 as in Table 2."""
+
+    def with_k2(k2: float) -> Nftsm:
+        return replace(g, k2=k2, k3=0.5 * k2)
+
+    k2 = rounded(0.5 * known.border(with_k2, 2.0))
+    return {"k2": k2, "k3": 0.5 * k2}
+
+
+def scaled(g: Nftsm, known: Known) -> Mapping[str, float]:
+    """Table 2 in the circle's own units: k1 R_d, k2 R_d / v_a and k3 R_d / v_a as with 200 m and 13 m/s."""
+    shorter, quicker = PAPER_STANDOFF / g.standoff, known.airspeed / g.standoff * PAPER_STANDOFF / PAPER_AIRSPEED
+    return {"k1": _TABLE_2["k1"] * shorter, "k2": _TABLE_2["k2"] * quicker, "k3": _TABLE_2["k3"] * quicker}
+
+
+RULES = MappingProxyType(
+    {
+        "behind_inner_loop": Rule(
+            "fitted",
+            "k2 is half of where the limit cycle begins behind the airframe's inner loop, k3 = k2 / 2",
+            behind_inner_loop,
+        ),
+        "scaled": Rule(
+            "fitted",
+            "k1 R_d, k2 R_d / v_a and k3 R_d / v_a are the paper's: another circle or airspeed is the same flight",
+            scaled,
+        ),
+    }
+)
 
 
 def reaching(g: Nftsm) -> Reaching:

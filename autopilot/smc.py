@@ -1,5 +1,6 @@
 """The law the paper compares with: sliding mode control with a linear-arctan manifold, Eq. (34)-(35)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan
 from types import MappingProxyType
@@ -9,7 +10,8 @@ from annotated_types import Gt
 
 from autopilot.guidance import UNKNOWN, Context, LawStep
 from autopilot.quantities import About
-from autopilot.standoff import Motion, Reaching, StandoffLaw, standoff_step
+from autopilot.rules import Known, Rule
+from autopilot.standoff import PAPER_AIRSPEED, PAPER_STANDOFF, Motion, Reaching, StandoffLaw, standoff_step
 
 GAIN_SETS = MappingProxyType(
     {"paper": {"c1": 0.2, "c2": 0.05, "c3": 0.005, "epsilon": 0.2}}  # Table 2, the row labelled TSM
@@ -32,6 +34,22 @@ class Smc(StandoffLaw):
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """The paper asks for positive gains only, which the fields hold."""
         return []
+
+
+def scaled(g: Smc, known: Known) -> Mapping[str, float]:
+    """Table 2 in the circle's own units: c2 R_d and c3 R_d / v_a as with 200 m and 13 m/s."""
+    shorter, quicker = PAPER_STANDOFF / g.standoff, known.airspeed / g.standoff * PAPER_STANDOFF / PAPER_AIRSPEED
+    paper = GAIN_SETS["paper"]
+    return {"c2": paper["c2"] * shorter, "c3": paper["c3"] * quicker}
+
+
+RULES = MappingProxyType(
+    {
+        "scaled": Rule(
+            "paper", "c2 R_d and c3 R_d / v_a are the paper's: another circle or airspeed is the same flight", scaled
+        )
+    }
+)
 
 
 def reaching(g: Smc) -> Reaching:

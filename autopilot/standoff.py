@@ -16,6 +16,7 @@ from autopilot.angles import wrap
 from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
+PAPER_STANDOFF, PAPER_AIRSPEED = 200.0, 13.0  # m, m/s: of the circle and the aircraft of Table 1
 _POINTS = 360  # on the circle
 _CLOSEST = 1e-6  # m: at a smaller distance the azimuth has no meaning; it also bounds the rate of the azimuth
 
@@ -103,7 +104,7 @@ Reaching = Callable[[Motion], tuple[float, float, float]]  # feed-forward, rest 
 class StandoffLaw:
     """The parameters that all standoff laws share: circle, limit, direction, and the quantities they compute with."""
 
-    standoff: Annotated[Metres, Ge(0.1), About("desired distance to the target, R_d")] = 200.0
+    standoff: Annotated[Metres, Ge(0.1), About("desired distance to the target, R_d")] = PAPER_STANDOFF
     max_heading_rate: Annotated[DegreesPerSecond, Gt(0), Unlimited(), About("limit of the command, Eq. (2)")] = radians(
         5.0
     )

@@ -87,7 +87,9 @@ def _laws() -> Iterator[tuple[str, str, list[str]]]:
         gains = list(next(iter(law.gain_sets.values())))
         rows = ([f"`{label}`", *(f"{values[gain]:.4g}" for gain in gains)] for label, values in law.gain_sets.items())
         doc = " ".join((law.value.__doc__ or "").split())
-        yield name, doc, list(markdown(["gain set", *gains], rows, "lr"))
+        rules = ([f"`{label}`", f"`{rule.base}`", rule.about] for label, rule in law.rules.items())
+        by_rule = ["", *markdown(["gain set by rule", "starts from", "what it sets"], rules)] if law.rules else []
+        yield name, doc, [*markdown(["gain set", *gains], rows, "lr"), *by_rule]
 
 
 def _plants() -> Iterator[str]:

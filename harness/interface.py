@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from autopilot import laws
 from autopilot.guidance import Law
@@ -16,6 +16,7 @@ from harness.error import ArgumentError, HarnessError, RecordingError, SettingsE
 from harness.flight import Flight
 from harness.log import FlightLog
 from harness.settings import document, flight_from_document
+from harness.settings.gains import by_rule
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,20 +27,26 @@ if TYPE_CHECKING:
 _EVERY = 1.0  # s between two lines of progress
 
 
-def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
+def law(name: str, gains: str | None = None, *, flight: Flight | None = None, **parameters: float | str) -> Law:
     """A guidance law by name with a named gain set, the law's default without one; a frozen value.
 
     `parameters` override single gains and what all laws have: `standoff` (m), `max_heading_rate` (rad/s, not degrees),
-    `direction`, `airspeed`, `command`. `harness list laws` shows all of them.
+    `direction`, `airspeed`, `command`. `harness list laws` shows all of them. A gain set that follows from a rule needs
+    the `flight` for whose circle, airspeed, period and airframe it is calculated.
 
     Raises `ArgumentError` for a law, a gain set or a parameter that there is not, with those that there are;
-    FutureWarning for the former name of a gain set.
+    and for a rule that has no answer; FutureWarning for the former name of a gain set.
 
     >>> harness.law("nftsm")
     >>> harness.law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
+    >>> harness.law("nftsm", "behind_inner_loop", flight=flight)
     """
+    kind = laws.LAWS.get(name)
     try:
-        return laws.law(name, gains, **parameters)
+        if kind is None or gains is None or gains not in kind.rules or flight is None:
+            return laws.law(name, gains, **parameters)
+        base: Any = laws.law(name, kind.rules[gains].base, **parameters)
+        return by_rule(replace(flight, law=replace(base, gains=gains)), parameters).law
     except ValueError as error:
         raise ArgumentError(str(error)) from None
 

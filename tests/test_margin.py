@@ -11,13 +11,13 @@ from autopilot.laws import law
 from autopilot.response import critical_gain, plain
 from harness.flight import Flight
 from harness.limit_cycle.margin import ENOUGH, Following, following, gain_margin
-from harness.limit_cycle.observed import fly
 from harness.limit_cycle.prediction import Loop, crossover, limit_cycle
 from harness.log.metric import measure
 from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.lagged import Lagged
 from harness.plants.plant import Start
+from harness.studies.observed_cycle import fly
 from tests.test_prediction import proportional
 
 STICK = aircraft.folder("ultra_stick_25e")

@@ -10,7 +10,6 @@ from autopilot.guidance import Guidance, Observation
 from autopilot.response import critical_gain, plain
 from harness.chatter import VISIBLE
 from harness.identification.manoeuvres import STEP
-from harness.limit_cycle.observed import fly
 from harness.limit_cycle.prediction import Loop, boundary, limit_cycle
 from harness.plants.lagged import Lagged
 from harness.plants.sixdof import SixDof
@@ -20,6 +19,7 @@ from harness.studies.limit_cycle import (
     loop_of,
     with_gains,
 )
+from harness.studies.observed_cycle import fly
 from tests.builders import DOCS, EXPERIMENTS, OwnLaw, invoke, turning
 
 DOCUMENT = DOCS / "answers" / "limit_cycle.md"

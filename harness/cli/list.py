@@ -20,6 +20,10 @@ def _laws() -> Iterator[str]:
             for chosen, values in law.gain_sets.items()
         )
         yield from table(["gain set", *gains], rows, "lr")
+        if law.rules:
+            yield ""
+            by_rule = ([name, rule.base, rule.about] for name, rule in law.rules.items())
+            yield from table(["gain set by rule", "starts from", "what it sets"], by_rule)
 
 
 def _aircraft() -> Iterator[str]:

@@ -68,8 +68,9 @@ def flown(settings: Mapping[str, Any]) -> str:
     law, plant = settings["law"], settings["plant"]
     airframe = f" {settings['aircraft']}" if PLANTS[plant].has_airframe else ""
     single = "".join(f", {gain} = {value:g}" for gain, value in _single_gains(law).items())
+    by_rule = "by the rule " if law["gains"] in LAWS[law["name"]].rules else ""
     return (
-        f"law {law['name']} with gains {law['gains']}{single}, on plant {plant}{airframe}, for "
+        f"law {law['name']} with gains {by_rule}{law['gains']}{single}, on plant {plant}{airframe}, for "
         f"{settings['duration_s']:g} s in {_air(settings['wind'])}, seed {settings['seed']}"
     )
 
@@ -100,8 +101,8 @@ def _difference(value: Value, earlier: Value) -> str:
 
 
 def _single_gains(law: Mapping[str, Any]) -> dict[str, float]:
-    """The gains that are not those of the named set."""
-    named = LAWS[law["name"]].gain_sets.get(law["gains"], {})
+    """The gains that are not those of the named set; of a rule those that it gave."""
+    named = LAWS[law["name"]].numbers(law["gains"])
     return {gain: law[gain] for gain, value in named.items() if law[gain] != value}
 
 

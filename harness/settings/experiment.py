@@ -54,13 +54,13 @@ def law_table(name: str | None, gains_given: bool) -> TableSchema:
         keys = {
             key: replace(s, required=False) for law in LAWS.values() for key, s in schema_of(law.value).settings.items()
         }
-        every = dict.fromkeys(gains for law in LAWS.values() for gains in (*law.gain_sets, CUSTOM))
+        every = dict.fromkeys(gains for law in LAWS.values() for gains in (*law.sets, CUSTOM))
         return TableSchema({**keys, **named, "gains": Setting(Literal[*every], "gains", required=False)}, dict)
     kind = LAWS[name]
-    value, sets = kind.value, {**kind.gain_sets, CUSTOM: {}}
+    value = kind.value
 
     def make(name: str, gains: str = kind.default, **given: float | str) -> object:
-        return value(**{"gains": gains, **sets[gains], **given})
+        return value(**{"gains": gains, **kind.numbers(gains), **given})
 
     own = {key: replace(s, required=s.required and gains_given) for key, s in schema_of(value).settings.items()}
-    return TableSchema({**named, **own, "gains": Setting(Literal[*sets], "gains", required=False)}, make)
+    return TableSchema({**named, **own, "gains": Setting(Literal[*kind.sets, CUSTOM], "gains", required=False)}, make)

@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import aircraft
 from autopilot.laws import LAWS
+from autopilot.rules import RuleError
 from harness.checks import problems, start_problems
 from harness.error import SettingsError
 from harness.files import file_name
@@ -19,6 +21,7 @@ from harness.margins import Assess
 from harness.settings.check import Checked, check, checked
 from harness.settings.experiment import CUSTOM, Experiment, document_table
 from harness.settings.former_names import without_former_names
+from harness.settings.gains import by_rule
 from harness.settings.keys import file_key, put
 from harness.settings.mended import concerns, mended
 from harness.settings.mistake import Mistake, Place, Places, settings_error
@@ -210,7 +213,21 @@ def _described(document: Mapping[str, object], folder: Path) -> Checked:
     schema = table.settings["flight"].table
     if isinstance(given, Mapping) and schema is not None:
         document = {**document, "flight": at_own_speed(_with_paths(given, folder), schema)}
-    return check(table, document)
+    return _with_gains_by_rule(check(table, document), document)
+
+
+def _with_gains_by_rule(described: Checked, document: Mapping[str, Any]) -> Checked:
+    """The same with the gains that a rule decides, but for those that the document gives."""
+    flight = described.value
+    if not isinstance(flight, Flight):
+        return described
+    given = document["flight"]["law"]
+    names = [setting.name for key, setting in schema_of(type(flight.law)).settings.items() if key in given]
+    try:
+        return Checked(by_rule(flight, names), described.mistakes)
+    except RuleError as error:
+        message = f"{given['gains']} follows from a rule that has no answer here: {error}"
+        return Checked(None, [*described.mistakes, Mistake(("flight", "law", "gains"), message)])
 
 
 def _with_paths(flight: Mapping[str, object], folder: Path) -> Mapping[str, object]:

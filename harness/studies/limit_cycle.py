@@ -22,12 +22,12 @@ from harness.drawing import draw
 from harness.identification.fit import fit
 from harness.identification.identify import of_heading_rate
 from harness.identification.manoeuvres import STEP, flown, held
-from harness.limit_cycle.observed import fly
 from harness.limit_cycle.prediction import LimitCycle, Loop, boundary, limit_cycle
 from harness.plants.identified import Identified, identified
 from harness.plants.lagged import Lagged
 from harness.plants.sixdof import SixDof
 from harness.studies.command import counted, out_option, run, write
+from harness.studies.observed_cycle import fly
 from harness.template import template
 
 AIRFRAMES = tuple(aircraft.names())

@@ -1,0 +1,55 @@
+"""Gains by rule: what the rule of a law makes of a flight."""
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import aircraft
+from autopilot.guidance import Law
+from autopilot.laws import LAWS
+from autopilot.rules import Known, Rule, RuleError
+from harness.flight import Flight
+
+if TYPE_CHECKING:
+    from autopilot.response import Response
+
+
+def by_rule(flight: Flight, given: Collection[str]) -> Flight:
+    """The flight with the gains that the rule of its law gives, but for those `given` by name; others as they are.
+
+    Raises `RuleError`, with the reason, where the rule has no answer.
+    """
+    law: Any = flight.law
+    kind = next((kind for kind in LAWS.values() if kind.value is type(law)), None)
+    if kind is None or law.gains not in kind.rules or set(kind.numbers(law.gains)) <= set(given):
+        return flight
+    from harness.plants.identified import IdentifiedError, identified  # late: few files name a rule
+
+    try:
+        response, why_unknown = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate, ""
+    except (IdentifiedError, FileNotFoundError) as error:
+        response, why_unknown = None, str(error)
+    gains = _gains(kind.rules[law.gains], law, flight.start.airspeed, flight.guidance_period, response, why_unknown)
+    return replace(flight, law=replace(law, **{name: value for name, value in gains.items() if name not in given}))
+
+
+@lru_cache(maxsize=1024)
+def _gains(
+    rule: Rule, law: Law, airspeed: float, period: float, response: "Response | None", why_unknown: str
+) -> Mapping[str, float]:
+    from harness.limit_cycle.prediction import Loop, boundary
+
+    def border(law_at: Callable[[float], Law], guess: float) -> float:
+        if response is None:
+            raise RuleError(why_unknown)
+        if law.max_heading_rate * law.standoff <= airspeed:
+            raise RuleError("the circle cannot be held: the heading-rate limit is below what it takes")
+        found = boundary(lambda gain: Loop(law_at(gain), response, airspeed, period), guess)
+        if math.isnan(found):
+            raise RuleError("no gain was found at which a limit cycle begins")
+        return found
+
+    known = Known(airspeed=airspeed, period=period, identified=response, why_unknown=why_unknown, border=border)
+    return rule.gains(law, known)
