@@ -30,8 +30,9 @@ from scipy.signal import freqz, lfilter, welch
 from scipy.stats import t as student
 
 import aircraft
-from autopilot.guidance import Guidance, LawStep, Observation
+from autopilot.guidance import Context, Guidance, LawStep, Observation
 from autopilot.laws import law
+from autopilot.response import Response
 from autopilot.standoff import relative_motion
 from harness.drawing import COLOURS, draw
 from harness.flight import Flight, air_of, plant_of
@@ -40,7 +41,6 @@ from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.lagged import Lagged
 from harness.plants.plant import Flying, Start
-from harness.plants.response import Response
 from harness.pool import computed
 from harness.studies.command import counted, out_option, run, write
 from harness.studies.paper.job import workers
@@ -277,7 +277,7 @@ class Omniscient:
     max_heading_rate: float = math.radians(60.0)
     command: Literal["heading_rate"] = "heading_rate"
 
-    def start(self, *_: object) -> LawStep:
+    def start(self, context: Context) -> LawStep:
         known, order = self.of.known, len(self.of.F) - self.of.known
         z, turn, k = np.zeros(len(self.of.F)), -self.speed / self.standoff, order - 1
 
@@ -414,7 +414,7 @@ def paint(figure: Figure, floors: Sequence[Floor]) -> None:
         right.loglog(hertz[1:], fit, line, color=colour, linewidth=1.0, label=each.airframe)
     left.set(xlabel="command activity, °/s²", ylabel="range error, m rms", xlim=(0.3, 30.0), ylim=(0.01, 5.0))
     left.set(title="The floor; dots: flown on lagged")
-    right.set(xlabel="Hz", ylabel="(°/s)²/Hz", title="Disturbance of the heading rate; dots: flown on sixdof")
+    right.set(xlabel="Hz", ylabel="(°/s)²/Hz", title="What it rests on: d; dots: flown on sixdof")
     _plain_ticks(left)
     left.legend(fontsize=8)
 
