@@ -7,7 +7,7 @@ from inspect import signature
 from types import MappingProxyType
 from typing import NamedTuple
 
-from autopilot import nftsm, smc
+from autopilot import l1, lgvf, nftsm, npfg, orbit_field, smc
 from autopilot.guidance import Law
 from autopilot.rules import Rule
 
@@ -38,6 +38,10 @@ LAWS: Mapping[str, LawKind] = MappingProxyType(
             nftsm.Nftsm, nftsm.GAIN_SETS, "fitted", nftsm.RULES, MappingProxyType({"identified": "fitted"})
         ),
         "smc": LawKind(smc.Smc, smc.GAIN_SETS, "paper", smc.RULES),
+        "l1": LawKind(l1.L1, l1.GAIN_SETS, "published", l1.RULES),
+        "npfg": LawKind(npfg.Npfg, npfg.GAIN_SETS, "published", npfg.RULES),
+        "lgvf": LawKind(lgvf.Lgvf, lgvf.GAIN_SETS, "published", lgvf.RULES),
+        "orbit_field": LawKind(orbit_field.OrbitField, orbit_field.GAIN_SETS, "published", orbit_field.RULES),
     }
 )
 

@@ -89,6 +89,18 @@ class Response:
         )
 
     @property
+    def lag(self) -> float:
+        """How late the response is to a slow command, s: minus the derivative of the transfer function at zero."""
+        return (
+            self.delay
+            + 2.0 * self.damping / self.frequency
+            - self.lead
+            + 2.0 * self.sideslip_damping / self.sideslip_frequency
+            - 2.0 * self.zero_damping / self.zero_frequency
+            + self.tail_share / self.tail_rate
+        )
+
+    @property
     def bandwidth(self) -> float:
         """The frequency at which the gain first falls below -3 dB, rad/s."""
         omega = self.frequency * np.geomspace(1e-3, 1e3, 6001)

@@ -98,6 +98,7 @@ AIRSPEEDS: Mapping[str, Callable[[Observation], float]] = MappingProxyType(  # t
 )
 _guidance = Guidance._make  # from a tuple, in half the time of the constructor
 Reaching = Callable[[Motion], tuple[float, float, float]]  # feed-forward, rest of the command, s
+Answer = tuple[float, float, float, float, float]  # r, s, heading error, feed-forward, rest of the command
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +124,22 @@ class StandoffLaw:
 
 def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
     """The law in flight. `reach` computes (feed-forward, rest of the command, s) for the paper's sense of circling."""
-    R_d, max_rate = law.standoff, law.max_heading_rate
+    R_d = law.standoff
+
+    def answer(o: Observation, v_a: float, psi_a: float) -> Answer:
+        motion = relative_motion(o, R_d, v_a, psi_a)
+        feed_forward, rest, s = reach(motion)
+        return motion[0], s, motion[3], feed_forward, rest
+
+    return limited_step(law, answer)
+
+
+def limited_step(law: StandoffLaw, answer: Callable[[Observation, float, float], Answer]) -> LawStep:
+    """A law in flight, with the airspeed, the limit and the direction that it is set to.
+
+    `answer` gets the observation, v_a and psi_a, and answers for the paper's sense of circling.
+    """
+    max_rate = law.max_heading_rate
     airspeed, by_course = AIRSPEEDS[law.airspeed], law.command == "course_rate"
 
     def step(o: Observation) -> Guidance:
@@ -134,11 +150,10 @@ def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
             psi_a = heading_from_course(v_a, atan2(o.velocity_east, o.velocity_north), W_x, W_y)
             if hypot(W_x, W_y) < v_a:
                 limit = max_rate / course_rate_ratio(v_a, psi_a, W_x, W_y)  # |u_chi| <= max_rate, Eq. (3)
-        motion = relative_motion(o, R_d, v_a, psi_a)
-        feed_forward, rest, s = reach(motion)
+        r, s, heading_error, feed_forward, rest = answer(o, v_a, psi_a)
         unlimited = feed_forward + rest
         limited = unlimited if -limit < unlimited < limit else copysign(limit, unlimited)
-        return _guidance((limited, motion[0], s, motion[3], feed_forward, unlimited))
+        return _guidance((limited, r, s, heading_error, feed_forward, unlimited))
 
     return step if law.direction == "paper" else lambda o: _mirror_guidance(step(_mirror_observation(o)))
 
