@@ -68,6 +68,9 @@ def problems(flight: Flight) -> list[Problem]:
                 f"{sample:g} s is neither a whole multiple nor a whole fraction of guidance_period_s, {guidance:g} s"
             )
             mistakes.append(Problem("estimator.period", neither, ("estimator.kind", "guidance_period")))
+    if flight.errors.command_delay and not _is_multiple(flight.errors.command_delay, flight.step):
+        not_multiple = f"{flight.errors.command_delay:g} s is not a whole multiple of step_s, {flight.step:g} s"
+        mistakes.append(Problem("errors.command_delay", not_multiple, ("step",)))
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:
         strong = f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s"

@@ -10,6 +10,7 @@ import aircraft
 from autopilot.estimator import Estimator
 from autopilot.guidance import Context, Law, uses_response
 from autopilot.quantities import About, Metres, OneOf, Seconds
+from harness.flight_errors import Errors
 from harness.plants.ladder import PLANTS, Setup
 from harness.plants.plant import Plant, Start
 from harness.world.air import Air
@@ -59,6 +60,7 @@ class Flight:
     wind: Wind = field(default_factory=Wind)
     estimator: Estimator = field(default_factory=Estimator)
     inner_loop: InnerLoop = field(default_factory=InnerLoop)
+    errors: Errors = field(default_factory=Errors)
     metrics: MetricSettings = field(default_factory=MetricSettings)
 
     @property
@@ -86,6 +88,8 @@ def context_of(flight: Flight) -> Context:
 
         with suppress(IdentifiedError, FileNotFoundError):
             response = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate
+            if flight.errors.response_speed != 1.0:
+                response = response.quicker(flight.errors.response_speed)
     at_once = PLANTS[flight.plant].at_once
     return Context(flight.guidance_period, flight.start.airspeed, flight.seed, response, at_once)
 

@@ -1,4 +1,4 @@
-"""What the law knows of the target at each guidance step: from a sensor and a filter, or from the truth itself."""
+"""What the law knows at each guidance step: of its own aircraft and the wind, with errors, and of the target."""
 
 import math
 from collections.abc import Callable
@@ -6,10 +6,42 @@ from collections.abc import Callable
 from autopilot.estimator import Estimator, Measurement, measurement
 from harness.flight import Flight
 from harness.plants.plant import End, Outcome
+from harness.plants.state import State
 from harness.world.randomness import stream
 from harness.world.target import TargetState
 
 NO_MEASUREMENT = Measurement(math.nan, math.nan)
+
+
+class Instruments:
+    """What the law knows of its own aircraft, with the errors of one flight; `wind` is its estimate, m/s, north, east.
+
+    The noise of the course depends on the seed and the number of the guidance step alone.
+    """
+
+    def __init__(self, flight: Flight) -> None:
+        errors = flight.errors
+        self.wind = errors.estimated(flight.wind.steady)
+        self._scale, self._deviation = errors.airspeed_scale, errors.course_noise
+        self._noise = stream(flight.seed, "course")
+
+    def read(self, state: State) -> State:
+        """The aircraft's state as it is measured at the next guidance step."""
+        if self._scale != 1.0:
+            state = state._replace(airspeed=self._scale * state.airspeed)
+        if self._deviation:
+            turned = self._deviation * self._noise.standard_normal()
+            c, s = math.cos(turned), math.sin(turned)
+            v_x, v_y = state.velocity_north, state.velocity_east
+            v_x, v_y = c * v_x - s * v_y, s * v_x + c * v_y
+            state = state._replace(velocity_north=v_x, velocity_east=v_y, heading=heading_in(self.wind, v_x, v_y))
+        return state
+
+
+def heading_in(wind: tuple[float, float], velocity_north: float, velocity_east: float) -> float:
+    """psi_a, rad: the direction of (ground velocity - wind), all m/s."""
+    W_x, W_y = wind
+    return math.atan2(velocity_east - W_y, velocity_north - W_x)
 
 
 class Estimation:

@@ -9,8 +9,9 @@ import numpy as np
 from autopilot.guidance import Context, Guidance, LawStep, Observation, started
 from harness.checks import problems
 from harness.flight import Flight, air_of, context_of, plant_of
-from harness.knowledge import Estimation, perfect_estimator
+from harness.knowledge import Estimation, Instruments, heading_in, perfect_estimator
 from harness.log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
+from harness.plants.late import Late
 from harness.plants.plant import End, Outcome, Plant
 from harness.plants.state import State
 from harness.world.target import TargetState
@@ -33,7 +34,7 @@ def simulate(
     for problem in problems(flight):
         raise ValueError(f"{problem.name}: {problem.message}")
     period, last = flight.guidance_period, flight.periods
-    steady_wind, nominal_airspeed = flight.wind.steady, flight.start.airspeed
+    nominal_airspeed, instruments = flight.start.airspeed, Instruments(flight)
     monitoring_range = flight.metrics.monitoring_range
 
     target = flight.target.start()
@@ -41,6 +42,9 @@ def simulate(
     estimator = estimation.at if estimation else perfect_estimator(flight.estimator)
     law = started(flight.law, context or context_of(flight))
     flying = (plant or plant_of(flight)).start(flight.start, air_of(flight))
+    if flight.errors.command_delay:
+        whole, steps = divmod(round(flight.errors.command_delay / flight.step), round(period / flight.step))
+        flying = Late(flying, whole, steps * flight.step)
 
     table, rows = bytearray((last + 1) * _ROW_BYTES), 0
     outcome, reason = Outcome.COMPLETED, ""
@@ -54,7 +58,7 @@ def simulate(
             time = k * period
             state, truth = flying.state, target(time)
             estimate = estimator(k, truth)
-            observation = observe(state, nominal_airspeed, steady_wind, estimate, time)
+            observation = observe(instruments.read(state), nominal_airspeed, instruments.wind, estimate, time)
             guidance = command(law, observation)
 
             _write_row(table, rows * _ROW_BYTES, time, *state, *truth, *guidance)
@@ -72,17 +76,17 @@ def simulate(
 
 
 def observe(
-    state: State, nominal_airspeed: float, steady_wind: tuple[float, float], estimate: TargetState, time: float = 0.0
+    state: State, nominal_airspeed: float, wind: tuple[float, float], estimate: TargetState, time: float = 0.0
 ) -> Observation:
-    """What the law gets to know: the aircraft's own state, the steady wind and the estimated target. SI, rad.
+    """What the law gets to know: its aircraft's state, as measured, the estimated steady wind and target. SI, rad.
 
-    Its heading psi_a is measured alike on every plant, as the direction of (ground velocity - steady wind). In gusts
+    Its heading psi_a is measured alike on every plant, as the direction of (ground velocity - estimated wind). In gusts
     this differs from the psi_a of Eq. (1): a law that saw the latter would miss how the gusts carry the aircraft.
     """
-    W_x, W_y = steady_wind
+    W_x, W_y = wind
     if state.wind_north != W_x or state.wind_east != W_y:
-        state = state._replace(heading=math.atan2(state.velocity_east - W_y, state.velocity_north - W_x))
-    return Observation._make((*state[:_OWN], nominal_airspeed, *steady_wind, *estimate, time))
+        state = state._replace(heading=heading_in(wind, state.velocity_north, state.velocity_east))
+    return Observation._make((*state[:_OWN], nominal_airspeed, *wind, *estimate, time))
 
 
 def command(law: LawStep, observation: Observation) -> Guidance:

@@ -1,0 +1,28 @@
+"""A plant whose commands arrive late."""
+
+from collections import deque
+
+from harness.plants.plant import Flying
+from harness.plants.state import State
+
+
+class Late:
+    """A plant in flight behind a delay of `whole` guidance periods and `part` seconds, less than a period.
+
+    Until the first command arrives the plant has zero: straight flight.
+    """
+
+    def __init__(self, flying: Flying, whole: int, part: float) -> None:
+        self._flying, self._part = flying, part
+        self._on_the_way = deque([0.0] * (whole + 1))  # the oldest is the one that the plant has
+
+    @property
+    def state(self) -> State:
+        return self._flying.state
+
+    def advance(self, heading_rate: float, period: float) -> None:
+        self._on_the_way.append(heading_rate)
+        present = self._on_the_way.popleft()
+        if self._part:
+            self._flying.advance(present, self._part)
+        self._flying.advance(self._on_the_way[0], period - self._part)
