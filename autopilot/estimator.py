@@ -49,14 +49,18 @@ class Estimate(NamedTuple):
 
 
 class TargetFilter(Protocol):
-    """The filter of one flight: `update` at every measurement, `at` in between."""
+    """The filter of one flight: `update` at every measurement, `miss` at a lost one, `at` in between."""
 
     def update(self, measured: Measurement) -> Measurement:
         """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
         ...
 
+    def miss(self) -> None:
+        """Moves on by a period whose measurement was lost. The first measurement never is."""
+        ...
+
     def at(self, age: float) -> Estimate:
-        """The estimate `age` s after the latest measurement."""
+        """The estimate `age` s after the latest measurement, or the latest lost one."""
         ...
 
 
@@ -99,6 +103,9 @@ class Estimator:
     process_velocity_variance: Annotated[SquareMetresPerSecond, Ge(0), About("per axis and measurement period, Q")] = (
         0.01
     )
+    lost_share: Annotated[float, Ge(0), Le(1), About("of the measurements, lost at random; never the first")] = 0.0
+    lost_from: Annotated[Seconds, Ge(0), About("since the start: when a gap in the measurements begins")] = 0.0
+    lost_for: Annotated[Seconds, Ge(0), About("length of this gap, in which the filter reckons on")] = 0.0
     initial_position: Annotated[
         tuple[Metres, Metres] | None, About("north, east; without it the first measurement")
     ] = None
@@ -153,11 +160,19 @@ class Tracker:
         if not begins or self._settings.initial_position is not None:
             kalman.update(np.array([measured]).T, linearised, expected, args=sensor, hx_args=sensor, residual=residual)
             innovation = Measurement(*kalman.y[:, 0].tolist())
-        self._x, self._P = kalman.x[:, 0].tolist(), kalman.P.tolist()
+        self._keep()
         return innovation
 
+    def miss(self) -> None:
+        """Moves on by a period without a measurement, as the filter predicts: at constant velocity, ever less sure."""
+        self.kalman.predict()
+        self._keep()
+
+    def _keep(self) -> None:
+        self._x, self._P = self.kalman.x[:, 0].tolist(), self.kalman.P.tolist()
+
     def at(self, age: float) -> Estimate:
-        """The estimate `age` s after the latest measurement: constant velocity, and the share of Q for that time."""
+        """The estimate `age` s after the latest period: constant velocity, and the share of Q for that time."""
         (x, x_dot, y, y_dot), P, s = self._x, self._P, self._settings
         share = age / s.period
         q, q_dot = share * s.process_position_variance, share * s.process_velocity_variance

@@ -88,6 +88,9 @@ def warnings(flight: Flight) -> list[str]:
         sentences.append("the circle is infeasible: holding it takes more than the heading-rate limit")
     if flight.wind.gusts and (gusty := _strongest_wind(flight)) >= v_a:
         sentences.append(f"wind and gusts reach {gusty:.3g} m/s, the airspeed is {v_a:g} m/s")
+    estimator = flight.estimator
+    if (estimator.lost_share or estimator.lost_for) and not estimator.filters:
+        sentences.append(f'no measurement is lost: estimator.kind = "{estimator.kind}" needs none')
     plant = PLANTS[flight.plant]
     setup = setup_of(flight)
     sentences += plant.warnings(setup)

@@ -48,7 +48,7 @@ class Estimation:
     """The sensor and the filter of one flight: the estimated target at each guidance step.
 
     `rows` holds one tuple per guidance step, for the log: the filter's `Estimate`, then the latest innovation (NaN in a
-    step without a new measurement).
+    step without a new measurement). A lost measurement is drawn as well, so that the others keep their noise.
     """
 
     def __init__(self, flight: Flight, target: Callable[[float], TargetState]) -> None:
@@ -56,10 +56,11 @@ class Estimation:
         self.rows: list[tuple[float, ...]] = []
         self._target = target
         self._measure, self._filter = sensor(flight.estimator, flight.seed), flight.estimator.start()
+        self._is_lost = losses(flight.estimator, flight.seed)
         self._step, self._period = flight.step, flight.estimator.period
         self._steps_per_guidance = round(flight.guidance_period / flight.step)
         self._steps_per_measurement = round(flight.estimator.period / flight.step)
-        self._measurements = 0  # taken so far; the next one has this number
+        self._measurements = 0  # due so far, with the lost ones; the next one has this number
 
     def at(self, k: int, truth: TargetState) -> TargetState:
         """The estimated target at the k-th guidance step, after all measurements due by then; SI, rad, north-east.
@@ -71,7 +72,12 @@ class Estimation:
         now, innovation = k * self._steps_per_guidance, NO_MEASUREMENT
         try:
             while self._measurements * self._steps_per_measurement <= now:
-                innovation = self._filter.update(self._measure(self._target(self._measurements * self._period)))
+                time = self._measurements * self._period
+                measured = self._measure(self._target(time))
+                if self._is_lost(time) and self._measurements:
+                    self._filter.miss()
+                else:
+                    innovation = self._filter.update(measured)
                 self._measurements += 1
             age = (now - (self._measurements - 1) * self._steps_per_measurement) * self._step
             estimate = self._filter.at(age)
@@ -81,6 +87,19 @@ class Estimation:
             raise End(Outcome.INVALID, "the estimator diverged: a number of its estimate is not finite")
         self.rows.append((*estimate, *innovation))
         return TargetState(*estimate[:4])
+
+
+def losses(estimator: Estimator, seed: int) -> Callable[[float], bool]:
+    """Whether the next measurement, due at this time, s, is lost; to be asked of each in turn.
+
+    What is lost at random depends on `seed` and the number of the measurement alone.
+    """
+    draw, begin, end = stream(seed, "lost measurements"), estimator.lost_from, estimator.lost_from + estimator.lost_for
+
+    def is_lost(time: float) -> bool:
+        return bool(draw.random() < estimator.lost_share) or begin <= time < end
+
+    return is_lost
 
 
 def perfect_estimator(settings: Estimator) -> Callable[[int, TargetState], TargetState]:

@@ -14,6 +14,7 @@ from autopilot.estimator import Estimator, Measurement, Tracker, ekf, initial, l
 from autopilot.guidance import UNKNOWN, Guidance, Observation
 from autopilot.laws import law
 from harness.checks import problems
+from harness.feasibility import warnings
 from harness.flight import MetricSettings, air_of, plant_of
 from harness.knowledge import Estimation, sensor
 from harness.log import COLUMNS, FlightLog
@@ -311,6 +312,48 @@ def test_what_falls_due_between_two_looks_is_measured_at_its_own_time() -> None:
     at: Callable[[float], TargetState] = one.target.start()
     each, only_last = Estimation(one, at), Estimation(one, at)
     assert [each.at(k, at(0.05 * k)) for k in range(38)][-1] == only_last.at(37, at(1.85))
+
+
+VARIANCES = [COLUMNS.index(f"target_{name}_variance") for name in ("north", "east", "velocity_north", "velocity_east")]
+
+
+def test_in_a_gap_of_the_measurements_the_filter_reckons_on_at_constant_velocity_and_ever_less_sure() -> None:
+    whole = simulate(EKF)
+    log = simulate(replace(EKF, estimator=replace(PAPER, lost_from=10.0, lost_for=5.0)))
+    assert np.flatnonzero(np.isnan(log["innovation_range"][::10])).tolist() == [0, *range(20, 30)]
+    before, gap = slice(0, 200), slice(199, 300)
+    assert np.array_equal(log.table[before], whole.table[before], equal_nan=True)
+    for way, speed in (("north", "velocity_north"), ("east", "velocity_east")):
+        assert len(set(log[f"target_{speed}_seen"][gap])) == 1
+        moved = np.diff(log[f"target_{way}_seen"][gap])
+        assert moved == pytest.approx(0.05 * log[f"target_{speed}_seen"][200], abs=1e-9)
+    assert (np.diff(log.table[gap, :][:, VARIANCES], axis=0) > 0.0).all()
+    assert log["target_north_variance"][300] < log["target_north_variance"][299]  # measured again
+
+
+@pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
+def test_of_the_measurements_a_share_is_lost_the_same_for_every_law_and_plant(plant: str) -> None:
+    estimator = replace(PAPER, lost_share=0.3, period=0.05)
+    log = simulate(replace(EKF, plant=plant, estimator=estimator, law=law("smc")))
+    lost = np.isnan(log["innovation_range"][1:])
+    assert 0.25 < lost.mean() < 0.35
+    drawn = stream(EKF.seed, "lost measurements").random(len(log))
+    assert np.array_equal(lost, drawn[1:] < 0.3)
+    another = simulate(replace(EKF, plant=plant, estimator=estimator, seed=1))
+    assert not np.array_equal(lost, np.isnan(another["innovation_range"][1:]))
+
+
+def test_all_measurements_but_the_first_may_be_lost() -> None:
+    log = simulate(replace(EKF, estimator=replace(PAPER, lost_share=1.0)))
+    assert log.outcome is Outcome.COMPLETED
+    assert np.isnan(log["innovation_range"]).all()
+    assert len(set(log["target_north_seen"])) == 1  # where it was first seen, at rest
+
+
+def test_with_the_truth_nothing_is_lost_and_a_warning_says_so() -> None:
+    one = replace(EKF, estimator=Estimator(lost_share=0.5))
+    assert simulate(one).digest == simulate(replace(one, estimator=Estimator())).digest
+    assert 'no measurement is lost: estimator.kind = "truth" needs none' in warnings(one)
 
 
 def test_who_knows_the_truth_loads_no_filter() -> None:

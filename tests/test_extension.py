@@ -117,6 +117,8 @@ ENTRIES = {  # file: what stands there, and what is written before it
             "    def update(self, measured: Measurement) -> Measurement:\n"
             "        r, azimuth = self._measured = measured\n"
             "        return Measurement(0.0, 0.0)\n\n"
+            "    def miss(self) -> None:\n"
+            "        pass\n\n"
             "    def at(self, age: float) -> Estimate:\n"
             "        r, azimuth = self._measured\n"
             "        return Estimate(r * math.cos(azimuth), r * math.sin(azimuth), 0.0, 0.0, 1.0, 1.0, 1.0, 1.0)\n\n\n",
