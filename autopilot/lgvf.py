@@ -20,7 +20,9 @@ from autopilot.quantities import About
 from autopilot.rules import Known, Rule, rounded
 from autopilot.standoff import StandoffLaw
 
-GAIN_SETS = MappingProxyType({"published": {"k": 1.0}})
+GAIN_SETS = MappingProxyType(
+    {"published": {"k": 1.0}}  # the papers leave it to the heading loop: the gain of mavsim's, as in `orbit_field`
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,10 @@ from autopilot.quantities import About
 from autopilot.rules import Known, Rule, rounded
 from autopilot.standoff import StandoffLaw
 
-GAIN_SETS = MappingProxyType({"published": {"k_orbit": 1.0, "k": 1.0}})
+GAIN_SETS = MappingProxyType(
+    # The authors' mavsim: its path follower's k_orbit, and 2 zeta omega_n of its course loop, zeta = 1, omega_n = 0.5/s
+    {"published": {"k_orbit": 1.0, "k": 1.0}}
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,8 +31,8 @@ STILL = Observation(*(0.0,) * 18)._replace(nominal_airspeed=V_A, airspeed=V_A)
 
 
 def free(name: str, **parameters: Any) -> Law:
-    """The law without a limit of its command."""
-    return law(name, max_heading_rate=1e9, **parameters)
+    """The law without a limit of its command, whatever the velocity that is observed."""
+    return law(name, max_heading_rate=1e9, airspeed="nominal", **parameters)
 
 
 def north_of_target(L: float, bar_chi: float = 0.0) -> Observation:
@@ -202,7 +202,7 @@ def test_each_law_says_what_its_source_asks_for() -> None:
 def by_lag(name: str, airframe: str, **given: float) -> tuple[Any, Response]:
     """The law by the rule for the scaled circle of an airframe, and the airframe's response."""
     airspeed = AIRSPEEDS[airframe]
-    table = {"name": name, "gains": "by_lag", "standoff_m": 200.0 / 13.0 * airspeed, **given}
+    table = {"name": name, "gains": "by_lag", "airspeed": "nominal", "standoff_m": 200.0 / 13.0 * airspeed, **given}
     flight = described(table, plant="sixdof", aircraft=airframe, start={"airspeed_mps": airspeed})
     return flight.law, identified(aircraft.folder(airframe), airspeed).heading_rate
 
