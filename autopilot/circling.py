@@ -15,7 +15,7 @@ from autopilot.standoff import Answer, StandoffLaw, limited_step
 
 MARGIN = 1.5  # PX4's NPFG_PERIOD_SF: what the period is longer than the least stable one
 _CLOSEST = 1e-6  # m: as in `standoff.relative_motion`
-_LEAST_COSINE = 0.05  # of the angle between course and heading; below it only where the wind exceeds the airspeed
+_LEAST_COSINE = 0.1  # of the angle between course and heading
 
 
 class Circling(NamedTuple):
@@ -63,15 +63,27 @@ def heading_rate(c: Circling, a: float) -> float:
     """The heading rate that bends the path by `a`, m/s2, clockwise across the course: a / (v_a cos(psi_a - chi_a)).
 
     With a = |v| u_chi it is Eq. (3), u_chi / L(psi_a), in the target's frame. The air's own acceleration is no work of
-    the aircraft. Where the wind exceeds the airspeed the cosine may vanish; a small one stands for it.
+    the aircraft. For what `steered` gives.
     """
-    v_along, v_out = c.v_along, c.v_out
-    V = sqrt(v_along * v_along + v_out * v_out)
-    if V == 0.0:
-        return a / c.v_a
-    cosine = (v_along * cos(c.bar_psi_a) + v_out * sin(c.bar_psi_a)) / V
-    a_air = (c.a_out * v_along - c.a_along * v_out) / V
-    return (a - a_air) / (c.v_a * (cosine if cosine > _LEAST_COSINE else _LEAST_COSINE))
+    V, cosine = _course(c)
+    a_air = (c.a_out * c.v_along - c.a_along * c.v_out) / V
+    return (a - a_air) / (c.v_a * cosine)
+
+
+def steered(c: Circling) -> Circling:
+    """The same with a course that turns as the heading does: with the air velocity where the wind carries it backwards.
+
+    Nothing changes below 0.995 of the airspeed: the angle between course and heading has a cosine above 0.1 there.
+    """
+    if _course(c)[1] > _LEAST_COSINE:
+        return c
+    return c._replace(v_along=c.v_a * cos(c.bar_psi_a), v_out=c.v_a * sin(c.bar_psi_a))
+
+
+def _course(c: Circling) -> tuple[float, float]:
+    """The speed in the target's frame, and the cosine of the angle between course and heading; zero at rest."""
+    V = sqrt(c.v_along * c.v_along + c.v_out * c.v_out)
+    return V, (c.v_along * cos(c.bar_psi_a) + c.v_out * sin(c.bar_psi_a)) / V if V else 0.0
 
 
 def heading_of_course(c: Circling, bar_chi: float, chi_dot: float) -> tuple[float, float]:

@@ -2,8 +2,8 @@
 
 Formulas as in ArduPilot's `AP_L1_Control`. It knows the velocity over the ground and no wind; the wind is in how a
 lateral acceleration becomes a heading rate, which ArduPilot leaves to the bank angle. It circles points at rest: a
-moving target is one in the target's frame. Left out is its memory of the side that it turned to when it flies away from
-the centre.
+moving target is one in the target's frame. As in ArduPilot the heading stands for a course that there is not. Left out
+is its memory of the side that it turned to when it flies away from the centre.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from typing import Annotated
 from annotated_types import Ge, Le
 
 from autopilot.angles import wrap
-from autopilot.circling import Circling, Steering, circling_step, heading_rate, period_by_lag
+from autopilot.circling import Circling, Steering, circling_step, heading_rate, period_by_lag, steered
 from autopilot.guidance import UNKNOWN, Context, LawStep
 from autopilot.quantities import About
 from autopilot.rules import Known, Rule
@@ -62,6 +62,7 @@ def steering(g: L1) -> Steering:
     K_capture = 4.0 * pi * g.damping / g.period  # K_L1 V / L1 with K_L1 = 4 zeta^2 and L1 = zeta T V / pi
 
     def steer(c: Circling) -> tuple[float, float, float, float]:
+        c = steered(c)
         e, v_along, v_out = c.r, c.v_along, c.v_out
         bar_chi = wrap(atan2(v_out, v_along))
         a_pd = K_x * e + K_v * v_out  # towards the centre, which is to the left

@@ -16,7 +16,7 @@ from typing import Annotated
 from annotated_types import Gt
 
 from autopilot.angles import wrap
-from autopilot.circling import Circling, Steering, circling_step, course_gain, heading_rate
+from autopilot.circling import Circling, Steering, circling_step, course_gain, heading_rate, steered
 from autopilot.guidance import UNKNOWN, Context, LawStep
 from autopilot.quantities import About
 from autopilot.rules import Known, Rule, rounded
@@ -71,6 +71,7 @@ def steering(g: OrbitField) -> Steering:
     slope, k = g.k_orbit / g.standoff, g.k
 
     def steer(c: Circling) -> tuple[float, float, float, float]:
+        c = steered(c)
         lean = slope * c.r
         chi_d_dot = c.lam_dot - slope * c.v_out / (1.0 + lean * lean)
         error = wrap(atan2(c.v_out, c.v_along) + atan(lean))

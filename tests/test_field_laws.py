@@ -254,3 +254,13 @@ def test_in_wind_of_60_percent_it_stays_within_half_a_metre(name: str, plant: st
     steering = law(name, max_heading_rate=math.radians(15.0), airspeed="ground")
     log = simulate(Flight(plant=plant, law=steering, duration=200.0, wind=Wind(steady=(7.8, 0.0))))
     assert np.abs(log["range_error"][log["time"] > 150.0]).max() < 0.5
+
+
+@pytest.mark.parametrize("name", FIELD_LAWS)
+@pytest.mark.parametrize("plant", ["kinematic", "sixdof"])
+def test_behind_a_target_that_outruns_it_the_aircraft_neither_circles_nor_swings(name: str, plant: str) -> None:
+    steering = law(name, max_heading_rate=math.radians(8.0), airspeed="ground")
+    log = simulate(Flight(plant=plant, law=steering, duration=120.0, target=Target(speed=16.0, heading=math.pi)))
+    late = log["time"] > 60.0
+    assert abs(np.ptp(np.unwrap(log["heading"][late]))) < math.radians(20.0)
+    assert np.degrees(np.abs(np.diff(log["heading_rate_command"][late])).sum()) / 60.0 < 0.05
