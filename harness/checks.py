@@ -26,7 +26,7 @@ class Problem(NamedTuple):
     others: tuple[str, ...] = ()  # the other fields that make it one
 
 
-_OF_PLANT = ("plant", "aircraft", "step", "start.airspeed", "inner_loop.rate_trim")
+_OF_PLANT = ("plant", "aircraft", "step", "start.airspeed", "inner_loop.rate_trim", "errors")
 
 
 def start_problems(flight: Flight) -> list[Problem]:
@@ -71,6 +71,9 @@ def problems(flight: Flight) -> list[Problem]:
     if flight.errors.command_delay and not _is_multiple(flight.errors.command_delay, flight.step):
         not_multiple = f"{flight.errors.command_delay:g} s is not a whole multiple of step_s, {flight.step:g} s"
         mistakes.append(Problem("errors.command_delay", not_multiple, ("step",)))
+    if 0.0 < flight.errors.actuator_lag < 0.5 * flight.step:
+        quick = f"{flight.errors.actuator_lag:g} s is too quick for steps of {flight.step:g} s, must be 0 or half a step"
+        mistakes.append(Problem("errors.actuator_lag", quick, ("step",)))
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:
         strong = f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s"

@@ -94,6 +94,9 @@ def warnings(flight: Flight) -> list[str]:
     plant = PLANTS[flight.plant]
     setup = setup_of(flight)
     sentences += plant.warnings(setup)
+    if not plant.has_body:
+        bodily = ", ".join(name for name, kind in PLANTS.items() if kind.has_body)
+        sentences += [f"errors.{name} changes the plant {bodily} only" for name in flight.errors.of_aircraft]
     if plant.banks:
         limits = aircraft.limits(setup.airframe)
         if not limits.slowest <= v_a <= limits.fastest:

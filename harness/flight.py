@@ -72,7 +72,7 @@ class Flight:
 def setup_of(flight: Flight) -> Setup:
     """What the flight's plant is made from. Raises FileNotFoundError for an unknown airframe."""
     airframe = aircraft.folder(flight.aircraft)
-    return Setup(airframe, flight.start.airspeed, flight.step, flight.inner_loop.rate_trim)
+    return Setup(airframe, flight.start.airspeed, flight.step, flight.inner_loop.rate_trim, flight.errors)
 
 
 def plant_of(flight: Flight) -> Plant:

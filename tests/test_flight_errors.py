@@ -4,21 +4,28 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import jsbsim
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import aircraft
 from autopilot.guidance import Context, Guidance, LawStep, Observation
 from autopilot.laws import law
+from harness.feasibility import warnings
 from harness.flight import Flight
 from harness.flight_errors import Errors
+from harness.limit_cycle.predicted import why_unknown
 from harness.log import FlightLog
 from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.ladder import PLANTS
+from harness.plants.plant import Outcome, PlantError, Start
+from harness.plants.sixdof import Trim, engage, load, si, trim, write
 from harness.settings import SettingsError, flight_from_document
+from harness.world.air import Air
 from harness.world.wind import Wind
-from tests.builders import FLIGHT, OwnLaw, turning
+from tests.builders import FLIGHT, SIXDOF, OwnLaw, turning
 
 STICK = aircraft.folder("ultra_stick_25e")
 PERIOD = FLIGHT.guidance_period
@@ -133,6 +140,9 @@ def test_a_law_is_told_a_response_quicker_than_the_identified_one() -> None:
         ({"response_speed": 0.0}, "flight.errors.response_speed"),
         ({"command_delay_s": 0.007}, "0.007 s is not a whole multiple of step_s, 0.005 s"),
         ({"command_delay_s": 11.0}, "flight.errors.command_delay_s"),
+        ({"mass_scale": 0.0}, "flight.errors.mass_scale"),
+        ({"cg_aft": -1.5}, "flight.errors.cg_aft"),
+        ({"actuator_lag_s": 0.001}, "flight.errors.actuator_lag_s: 0.001 s is too quick for steps of 0.005 s"),
     ],
 )
 def test_an_error_out_of_bounds_is_refused(errors: dict[str, float], message: str) -> None:
@@ -150,3 +160,96 @@ def test_with_the_airspeed_from_the_ground_an_error_of_the_wind_estimate_matters
         )  # fmt: skip
         settled[airspeed] = float(np.sqrt(np.mean(simulate(flight)["range_error"][-800:] ** 2)))
     assert settled["ground"] < 0.1 * settled["nominal"]
+
+
+def steady(errors: Errors) -> tuple[jsbsim.FGFDMExec, Trim]:
+    """The Ultra Stick in trim at 13 m/s in still air, with these errors."""
+    fdm = load(STICK, 0.005, errors)
+    return fdm, trim(fdm, Start(), Air())
+
+
+@pytest.mark.parametrize("errors", [Errors(), Errors(mass_scale=0.9), Errors(mass_scale=1.1), Errors(cg_aft=0.1)])
+def test_the_trim_carries_the_weight_and_balances_the_moment_about_the_centre_of_gravity(errors: Errors) -> None:
+    """By the textbook's formulas and the published numbers of the Ultra Stick, in steady level flight."""
+    fdm, x = steady(errors)
+    data = aircraft.data(STICK)
+    aero, S, c, m = data["aero"], data["ref"]["S"]["v"], data["ref"]["c"]["v"], data["mass"]["m"]["v"]
+    ahead, below = data["ref"]["aero_offset"]["v"][0], data["propulsion"]["thrust_offset"]["v"][2]
+    coefficient = {
+        name: aero[name]["v"] for name in ("CL0", "CLa", "CLde", "CD0", "kD", "CLminD", "Cm0", "Cma", "Cmde")
+    }
+    alpha, elevator = x.pitch, x.elevator
+    qS = 0.5 * fdm["atmosphere/rho-slugs_ft3"] * 515.3788183931961 * 13.0**2 * S
+    CL = coefficient["CL0"] + coefficient["CLa"] * alpha + coefficient["CLde"] * elevator
+    lift, drag = qS * CL, qS * (coefficient["CD0"] + coefficient["kD"] * (CL - coefficient["CLminD"]) ** 2)
+    drag += qS * aero["CDde_abs"]["v"] * abs(elevator)
+    thrust = drag / math.cos(alpha)
+    assert lift + thrust * math.sin(alpha) == pytest.approx(errors.mass_scale * m * 9.80665, rel=3e-3)
+    normal = lift * math.cos(alpha) + drag * math.sin(alpha)
+    Cm = coefficient["Cm0"] + coefficient["Cma"] * alpha + coefficient["Cmde"] * elevator
+    moments = (qS * c * Cm, normal * (ahead + errors.cg_aft * c), thrust * below)
+    assert sum(moments) == pytest.approx(0.0, abs=0.01 * max(map(abs, moments)))
+
+
+def test_more_mass_leaves_the_moments_of_inertia_as_they_are() -> None:
+    (heavy, _), (right, _) = steady(Errors(mass_scale=1.1)), steady(Errors())
+    assert si(heavy, "inertia/mass-slugs") == pytest.approx(1.1 * si(right, "inertia/mass-slugs"))
+    for axis in ("xx", "yy", "zz", "xz"):
+        assert heavy[f"inertia/i{axis}-slugs_ft2"] == pytest.approx(right[f"inertia/i{axis}-slugs_ft2"])
+
+
+@pytest.mark.parametrize("name", aircraft.names())
+def test_a_surface_lags_its_servo_by_one_first_order_more(name: str) -> None:
+    """A small step of the aileron's command: the late one is the right one through 1 / (1 + 0.1 s)."""
+    step, size, lag = 0.001, 0.01, 0.1
+    deflections = {}
+    for errors in (Errors(), Errors(actuator_lag=lag)):
+        fdm = load(aircraft.folder(name), step, errors)
+        start = Start(airspeed=aircraft.limits(aircraft.folder(name)).design_airspeed)
+        engage(fdm, trim(fdm, start, Air()), start, True)
+        write(fdm, "inner-loop/engaged", 0.0)
+        write(fdm, "inner-loop/aileron-rad", size)
+        flown = []
+        for _ in range(500):
+            fdm.run()
+            flown.append(fdm["fcs/left-aileron-pos-rad"])
+        deflections[errors.actuator_lag] = np.array(flown)
+    right, late = deflections[0.0], deflections[lag]
+    followed = lfilter([step / (2 * lag + step)] * 2, [1.0, -(2 * lag - step) / (2 * lag + step)], right)
+    assert right[-1] == pytest.approx(size, rel=1e-3)
+    assert late == pytest.approx(followed, abs=0.01 * size)
+
+
+def test_the_errors_of_the_aircraft_leave_the_start_in_trim_and_change_the_flight() -> None:
+    flights = {"right": SIXDOF, "late": replace(SIXDOF, errors=Errors(actuator_lag=0.05))}
+    flights |= {"heavy": replace(SIXDOF, errors=Errors(mass_scale=1.1, cg_aft=-0.1))}
+    logs = {name: simulate(flight) for name, flight in flights.items()}
+    assert len({log.digest for log in logs.values()}) == 3
+    assert logs["late"]["elevator"][0] == pytest.approx(logs["right"]["elevator"][0], abs=1e-9)
+    assert logs["heavy"]["throttle"][0] > logs["right"]["throttle"][0]
+    for log in logs.values():
+        assert log.outcome is Outcome.COMPLETED
+        assert np.abs(log["altitude"][:60] - 150.0).max() < 0.5
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_a_plant_without_mass_or_actuators_warns_and_flies_as_it_would(plant: str) -> None:
+    flight = replace(FLIGHT, plant=plant, errors=Errors(mass_scale=1.1, actuator_lag=0.02), duration=1.0)
+    told = [warning for warning in warnings(flight) if warning.startswith("errors.")]
+    if PLANTS[plant].has_body:
+        assert told == []
+    else:
+        only = "changes the plant sixdof only"
+        assert told == [f"errors.mass_scale {only}", f"errors.actuator_lag {only}"]
+        assert simulate(flight).digest == simulate(replace(flight, errors=Errors())).digest
+
+
+def test_an_aircraft_too_heavy_to_fly_is_refused() -> None:
+    with pytest.raises(PlantError, match="no level trim at 13 m/s"):
+        simulate(replace(SIXDOF, errors=Errors(mass_scale=2.0)))
+
+
+@pytest.mark.parametrize("errors", [Errors(command_delay=0.1), Errors(mass_scale=1.1), Errors(response_speed=2.0)])
+def test_of_a_loop_that_an_error_changes_nothing_is_predicted(errors: Errors) -> None:
+    assert why_unknown(replace(SIXDOF, errors=errors)).startswith("the prediction does not know of errors.")
+    assert why_unknown(replace(SIXDOF, errors=Errors(wind=1.0))) == ""

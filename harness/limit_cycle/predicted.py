@@ -46,6 +46,8 @@ def why_unknown(flight: Flight) -> str:
 
 def _why_not(flight: Flight) -> str:
     """What keeps from asking for a prediction; empty when nothing does."""
+    if changed := flight.errors.of_loop:
+        return f"the prediction does not know of errors.{changed[0]}"
     if not PLANTS[flight.plant].has_airframe:
         return f"the plant {flight.plant} has no airframe"
     try:

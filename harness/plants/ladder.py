@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import aircraft
 import autopilot
+from harness.flight_errors import Errors
 from harness.plants.kinematic import Kinematic
 from harness.plants.plant import Plant
 
@@ -24,6 +25,7 @@ class Setup(NamedTuple):
     airspeed: float  # nominal, m/s
     step: float  # of the 6-DOF simulation, s
     rate_trim: bool  # whether the inner loop removes the shortfall of the turn rate
+    errors: Errors = Errors()  # of the aircraft
 
 
 class Cost(NamedTuple):
@@ -50,6 +52,7 @@ class PlantKind:
     adds: str  # what it adds to the rung below, as a noun phrase
     make: Callable[[Setup], Plant]  # raises `PlantError`
     at_once: bool = False  # whether the heading rate follows its command at once
+    has_body: bool = False  # whether it has a mass, a centre of gravity and actuators
     banks: bool = False  # whether it turns by banking, within the airframe's bank limit and airspeed envelope
     files: Callable[[Path], Mapping[str, Path]] = _no_files  # the files of an airframe that decide its flights, by name
     libraries: tuple[str, ...] = ()  # the distributions whose version decides its flights
@@ -81,7 +84,7 @@ def _coordinated(setup: Setup) -> Plant:
 def _sixdof(setup: Setup) -> Plant:
     from harness.plants.sixdof import SixDof  # late: only this plant needs JSBSim
 
-    return SixDof(setup.airframe, setup.step, setup.rate_trim)
+    return SixDof(setup.airframe, setup.step, setup.rate_trim, setup.errors)
 
 
 def _airframe_files(airframe: Path) -> dict[str, Path]:
@@ -149,6 +152,7 @@ PLANTS: Mapping[str, PlantKind] = MappingProxyType(
             about="A JSBSim airframe with six degrees of freedom under its native inner loop.",
             adds="the rest of 6-DOF",
             make=_sixdof,
+            has_body=True,
             banks=True,
             files=_sixdof_files,
             libraries=("jsbsim",),

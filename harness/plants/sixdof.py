@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -19,6 +20,7 @@ import numpy as np
 import aircraft
 import autopilot
 from autopilot.angles import wrap
+from harness.flight_errors import Errors
 from harness.plants.plant import End, Outcome, PlantError, Start
 from harness.plants.state import State
 from harness.plants.turn import GRAVITY
@@ -77,8 +79,58 @@ class NoTrimError(ValueError):
     """There is no steady level flight at this airspeed."""
 
 
-def load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
-    """A new JSBSim with this airframe and its inner loop, stepping by `step` seconds. Raises `ModelError`."""
+_NO_ERRORS = Errors()
+
+
+def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> jsbsim.FGFDMExec:
+    """A new JSBSim with this airframe and its inner loop, stepping by `step` seconds. Raises `ModelError`.
+
+    Errors of the aircraft are in a copy of its model: JSBSim lets nobody set mass or lags of a loaded one.
+    """
+    if not errors.of_aircraft:
+        return _load(airframe, step)
+    with TemporaryDirectory(prefix="harness-") as folder:
+        copy = Path(folder) / airframe.name
+        copy.mkdir()
+        try:
+            tree = ElementTree.parse(aircraft.model(airframe))
+        except (OSError, ElementTree.ParseError) as error:
+            raise ModelError(f"{aircraft.model(airframe)}: {error}") from None
+        _alter(tree.getroot(), errors)
+        tree.write(aircraft.model(copy), encoding="utf-8")
+        return _load(copy, step)
+
+
+def _alter(model: ElementTree.Element, errors: Errors) -> None:
+    """Puts the errors of the aircraft into its model. Raises `ModelError` for one that `make models` did not write."""
+
+    def found(path: str) -> ElementTree.Element:
+        if (element := model.find(path)) is None:
+            raise ModelError(f"{model.get('name')}: no {path} in the model, for an error of the aircraft")
+        return element
+
+    def number(path: str) -> float:
+        return float(found(path).text or "nan")
+
+    found("mass_balance/emptywt").text = repr(errors.mass_scale * number("mass_balance/emptywt"))
+    x = "mass_balance/location[@name='CG']/x"  # metres aft, as the chord
+    found(x).text = repr(number(x) + errors.cg_aft * number("metrics/chord"))
+    if not errors.actuator_lag:
+        return
+    channel = found("flight_control/channel")
+    for i, surface in enumerate(("elevator", "aileron", "rudder")):
+        before, late = f"inner-loop/{surface}-rad", f"actuators/late-{surface}-rad"
+        commanded = [element for element in channel.iter("input") if (element.text or "").strip() == before]
+        if commanded:
+            lag = ElementTree.Element("lag_filter", name=late)
+            ElementTree.SubElement(lag, "input").text = before
+            ElementTree.SubElement(lag, "c1").text = repr(1.0 / errors.actuator_lag)
+            channel.insert(i, lag)
+        for element in commanded:
+            element.text = late
+
+
+def _load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
     _load_log.problems.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_dt(step)  # before the model: its components keep the step they were made with
@@ -270,18 +322,20 @@ _READ = (
 class SixDof:
     """A JSBSim airframe, given by its folder, under its native inner loop, stepped by `step` seconds.
 
-    `rate_trim` switches the slow integrator that removes the turn-rate shortfall of a bank-only turn.
+    `rate_trim` switches the slow integrator that removes the turn-rate shortfall of a bank-only turn. The inner loop is
+    the one of an airframe without `errors`.
     """
 
     airframe: Path
     step: float
     rate_trim: bool
+    errors: Errors = _NO_ERRORS
 
     def start(self, start: Start, air: Air) -> "_SixDofFlying":
         if not start.altitude > GROUND:
             raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
         limits = aircraft.limits(self.airframe)
-        fdm = load(self.airframe, self.step)
+        fdm = load(self.airframe, self.step, self.errors)
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:
