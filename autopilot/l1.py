@@ -45,7 +45,10 @@ class L1(StandoffLaw):
 
 
 def by_lag(g: L1, known: Known) -> Mapping[str, float]:
-    """The period by the rule of `npfg`: near the circle the two laws are the same."""
+    """The period by the rule of `npfg`: near the circle the two laws are the same.
+
+    From afar so short a period asks for more than a limited heading rate gives, and the aircraft overshoots.
+    """
     return {"period": period_by_lag(g.damping, known)}
 
 
