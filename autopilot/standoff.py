@@ -115,7 +115,7 @@ class StandoffLaw:
     airspeed: Annotated[
         Literal["nominal", "measured", "ground"],
         About("the v_a that the law computes with; ground is |ground velocity - estimated wind|"),
-    ] = "nominal"
+    ] = "ground"
     command: Annotated[
         Literal["heading_rate", "course_rate"],
         About("the quantity that is limited: heading rate, or course rate by Eq. (3), which needs no air data"),

@@ -56,7 +56,8 @@ def one(plant: str, airframe: str, law: str, air: str, **others: Any) -> tuple[s
     airspeed = AIRFRAMES[airframe]
     flight = {
         "plant": plant, "aircraft": airframe, "duration_s": 40.0, "seed": 7,
-        "law": {**LAWS[law], "standoff_m": 200.0 * airspeed / 13.0, "max_heading_rate_deg_s": 10.0},
+        "law": {"airspeed": "nominal", **LAWS[law], "standoff_m": 200.0 * airspeed / 13.0,
+                "max_heading_rate_deg_s": 10.0},
         "start": {"airspeed_mps": airspeed}, "wind": AIR[air], **others,
     }  # fmt: skip
     return ", ".join([plant, airframe, law, air, *others]), flight

@@ -81,11 +81,12 @@ def cases(kind: str, count: int) -> Iterator[Case]:
         azimuth, beyond, off = draw.uniform(0.0, math.tau), draw.uniform(-0.1, 0.3), draw.uniform(-0.3, 0.3)
         speed = aircraft.limits(aircraft.folder(airframe)).design_airspeed
         standoff = 200.0 * speed / 13.0
+        nominal: dict[str, float | str] = {"airspeed": "nominal", "standoff": standoff, "max_heading_rate": limit}
         k2 = times * border(airframe, period, limit, power)
         if kind == "calm" and draw.random() < 0.3:
-            flown = law("smc", standoff=standoff, max_heading_rate=limit)
+            flown = law("smc", "paper", **nominal)
         else:
-            flown = law("nftsm", "fitted", k2=k2, k3=power * k2, standoff=standoff, max_heading_rate=limit)
+            flown = law("nftsm", "fitted", **nominal, k2=k2, k3=power * k2)
         distance, name = standoff * (1.0 + beyond), airs[seed % len(airs)]
         wind, estimator = AIR[name]
         flight = Flight(
@@ -115,7 +116,8 @@ def border(airframe: str, period: float, limit: float, power: float) -> float:
 
     def loop(k2: float) -> Loop:
         standoff = 200.0 * speed / 13.0
-        nftsm = law("nftsm", "fitted", k2=k2, k3=power * k2, standoff=standoff, max_heading_rate=limit)
+        nominal: dict[str, float | str] = {"airspeed": "nominal", "standoff": standoff, "max_heading_rate": limit}
+        nftsm = law("nftsm", "fitted", **nominal, k2=k2, k3=power * k2)
         return Loop(nftsm, response, speed, period)
 
     return boundary(loop, 3.0)

@@ -15,11 +15,10 @@ from typing import NamedTuple
 
 import click
 
-from autopilot.laws import law
 from harness.pool import computed
 from harness.studies.command import counted, out_option, run, write
 from harness.studies.paper.decision import metres
-from harness.studies.paper.experiments import EXPERIMENTS, LAWS, Trace, flight, flown
+from harness.studies.paper.experiments import EXPERIMENTS, Trace, flight, flown, paper_law
 from harness.studies.paper.job import workers
 from harness.studies.paper.measures import overshoot, peak, restricted, settled
 from harness.template import template
@@ -53,7 +52,7 @@ class Pair(NamedTuple):
 def trace(experiment: str, alpha2: float, beta2: float, period: float | None = None, duration: float = 0.0) -> Trace:
     """NFTSM with these coefficients in one of the paper's experiments."""
     paper_flight = flight(experiment, "NFTSM", duration=duration or EXPERIMENTS[experiment].measured)
-    steering = law(*LAWS["NFTSM"], alpha2=alpha2, beta2=beta2, max_heading_rate=paper_flight.law.max_heading_rate)
+    steering = paper_law("NFTSM", alpha2=alpha2, beta2=beta2, max_heading_rate=paper_flight.law.max_heading_rate)
     period = period or paper_flight.guidance_period
     return flown(replace(paper_flight, law=steering, guidance_period=period, step=min(0.005, period)))
 

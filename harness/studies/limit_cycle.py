@@ -49,7 +49,8 @@ def airframe_of(name: str) -> tuple[Path, Identified]:
 def loop_of(known: Identified, k2: float = PAPER_K2, k3: float = PAPER_K3, limit_deg_s: float = 5.0) -> Loop:
     """NFTSM with these reaching gains on the paper's circle, at 25 m/s as much wider, behind the response."""
     standoff = 200.0 * known.airspeed / 13.0
-    nftsm = law("nftsm", "fitted", k2=k2, k3=k3, standoff=standoff, max_heading_rate=math.radians(limit_deg_s))
+    limit = math.radians(limit_deg_s)
+    nftsm = law("nftsm", "fitted", airspeed="nominal", k2=k2, k3=k3, standoff=standoff, max_heading_rate=limit)
     return Loop(nftsm, known.heading_rate, known.airspeed, PERIOD)
 
 

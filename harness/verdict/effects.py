@@ -118,7 +118,7 @@ def _adds(below: str, above: str) -> str:
 
 
 def _undisturbed(flights: pd.DataFrame) -> np.ndarray:
-    """Whether a flight has no disturbance: still air, the truth, the nominal airspeed, the shortest period flown."""
+    """Whether a flight has no disturbance: still air, the truth, the nominal airspeed, the shortest period."""
     table = spread(flights)
     quiet = np.ones(len(table), bool)
     for column, value in _references(table).items():
@@ -127,7 +127,7 @@ def _undisturbed(flights: pd.DataFrame) -> np.ndarray:
 
 
 def _references(table: pd.DataFrame) -> dict[str, object]:
-    known = {column: value for column, value in UNDISTURBED.items() if column in table}
+    known = {name: value for name, value in UNDISTURBED.items() if name in table and (table[name] == value).any()}
     if "guidance_period_s" in table:
         known["guidance_period_s"] = table["guidance_period_s"].min()
     return known

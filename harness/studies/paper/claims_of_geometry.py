@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.guidance import Observation
-from autopilot.laws import law
 from autopilot.nftsm import Nftsm
 from autopilot.standoff import course_rate_ratio, ground_speed, relative_motion
 from harness.studies.estimator import MEASURED, SEEDS, STATES, band, examine, fitting_case
 from harness.studies.paper.decision import Answer, Decision, below, decide, every, largest, less
-from harness.studies.paper.experiments import LAWS
+from harness.studies.paper.experiments import paper_law
 from harness.studies.paper.theory import manifold_reach
 
 Array = NDArray[np.float64]
@@ -25,7 +24,7 @@ EXACT = 1e-9
 
 def nftsm(label: str, max_heading_rate: float = math.inf) -> Nftsm:
     """One of the paper's NFTSM laws."""
-    g = law(*LAWS[label], max_heading_rate=max_heading_rate)
+    g = paper_law(label, max_heading_rate=max_heading_rate)
     assert isinstance(g, Nftsm)
     return g
 

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.laws import law
 from harness.studies.paper.claims_of_geometry import nftsm
 from harness.studies.paper.columns import Column
 from harness.studies.paper.decision import Decision, decide, metres, sooner, within
-from harness.studies.paper.experiments import EXPERIMENTS, LAWS, NEITHER, NO_TURN_RATE, TRUTH, Reading, flight
+from harness.studies.paper.experiments import EXPERIMENTS, NEITHER, NO_TURN_RATE, TRUTH, Reading, flight, paper_law
 from harness.studies.paper.measures import (
     CONVERGED,
     ON_THE_CIRCLE,
@@ -401,7 +400,7 @@ def alpha2_and_beta2(on: Column) -> Decision:
     shocks: dict[tuple[float, float], float] = {}
     for pair in ((0.1, 2.4), (0.2, 2.4), (0.4, 2.4), (0.8, 2.4), (1.6, 2.4), (0.4, 1.2), (0.4, 4.8)):
         paper_flight = flight("30", "NFTSM", Reading(period=0.005))
-        log = on.fly(replace(paper_flight, law=law(*LAWS["NFTSM"], alpha2=pair[0], beta2=pair[1])))
+        log = on.fly(replace(paper_flight, law=paper_law("NFTSM", alpha2=pair[0], beta2=pair[1])))
         times[pair], shocks[pair] = settled(log, ON_THE_CIRCLE), overshoot(log)
         lines.append(f"({pair[0]:g}, {pair[1]:g}) {within(times[pair])}, {metres(shocks[pair])}")
     small, fitted, large = (0.1, 2.4), (0.4, 2.4), (1.6, 2.4)

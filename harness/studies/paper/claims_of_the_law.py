@@ -7,14 +7,13 @@ from itertools import pairwise
 import numpy as np
 
 from autopilot.guidance import Law
-from autopilot.laws import law
 from autopilot.nftsm import Nftsm
 from harness.checks import problems
 from harness.flight import Flight
 from harness.studies.paper.claims_of_the_manifold import inner_rate, manifold
 from harness.studies.paper.columns import Column, EndedEarlyError
 from harness.studies.paper.decision import Decision, decide, every, less, metres, within
-from harness.studies.paper.experiments import LAWS, STRAIGHT, Reading, flight, own
+from harness.studies.paper.experiments import STRAIGHT, Reading, flight, own, paper_law
 from harness.studies.paper.measures import ON_THE_CIRCLE, azimuth, peak, rms, settled, turns
 from harness.studies.paper.theory import longest_stable_period, reaching_time
 from harness.world.target import Target
@@ -85,7 +84,7 @@ def coordinated(on: Column) -> Decision:
 def flies_by_course(on: Column) -> Decision:
     """NFTSM in 3.6 m/s of wind, by heading and by course, limited to 10 deg/s."""
     by_heading = replace(own("NFTSM", Target(), 100.0, 10.0), wind=Wind(steady=(3.0, 2.0)))
-    by_course = replace(by_heading, law=law(*LAWS["NFTSM"], max_heading_rate=math.radians(10.0), command="course_rate"))
+    by_course = replace(by_heading, law=paper_law("NFTSM", max_heading_rate=math.radians(10.0), command="course_rate"))
     times = [settled(on.fly(each), 1.0) for each in (by_heading, by_course)]
     return decide(
         times[1] is not None,
@@ -255,7 +254,7 @@ def sampling(on: Column, label: str) -> Decision:
     """The longest guidance period, of those that the column tries, at which the law converges from 30 deg."""
     limited = _converging(on, label, flight("30", label).law)
     sentences = [f"from 30° to {tolerance:g} m {_longest(each)}" for tolerance, each in limited.items()]
-    free = law(*LAWS[label], max_heading_rate=math.inf)
+    free = paper_law(label, max_heading_rate=math.inf)
     if isinstance(free, Nftsm):
         unlimited = _converging(on, label, free)
         for i, (tolerance, each) in enumerate(unlimited.items()):

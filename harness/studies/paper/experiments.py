@@ -112,13 +112,18 @@ EXPERIMENTS: Mapping[str, PaperExperiment] = MappingProxyType(
 )
 
 
+def paper_law(label: str, **parameters: float | str) -> Law:
+    """One of the paper's laws, with the airspeed that the paper takes for constant."""
+    name, gains = LAWS[label]
+    return law(name, gains, **{"airspeed": "nominal", **parameters})
+
+
 def flight(experiment: str, label: str, reading: Reading | None = None, duration: float | None = None) -> Flight:
     """One law in one experiment; without a reading under the experiment's own, without a duration the paper's."""
     e = EXPERIMENTS[experiment]
     reading = reading or e.reading
-    name, gains = LAWS[label]
     limited = label not in e.unlimited if reading.limited is None else reading.limited
-    steering: Law = law(name, gains, max_heading_rate=LIMIT if limited else math.inf)
+    steering = paper_law(label, max_heading_rate=LIMIT if limited else math.inf)
     blind = not e.target.segments and reading.known.kind == "truth"  # it has no manoeuvres to know of
     return Flight(
         plant="kinematic",
@@ -136,7 +141,7 @@ def flight(experiment: str, label: str, reading: Reading | None = None, duration
 def own(label: str, target: Target, duration: float, limit_deg_s: float = math.inf, period: float = 0.02) -> Flight:
     """A law round a target of our own, from the paper's start at 30 deg."""
     paper = flight("30", label)
-    steering = law(*LAWS[label], max_heading_rate=math.radians(limit_deg_s))
+    steering = paper_law(label, max_heading_rate=math.radians(limit_deg_s))
     return replace(
         paper, law=steering, target=target, duration=duration, guidance_period=period, step=min(0.005, period)
     )
