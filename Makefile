@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence notebook verdict bench fuzz clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed notebook verdict bench fuzz clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -42,6 +42,10 @@ turbulence: install  ## fly the airframes in turbulence: docs/answers/turbulence
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/severe --log none --set wind.turbulence=severe --limit 90
 	$(BIN)/harness run experiments/turbulence.toml --out out/turbulence/light --log none --set wind.turbulence=light --limit 60
 	$(BIN)/python -m harness.studies.turbulence out/turbulence/light out/turbulence/moderate out/turbulence/unturned out/turbulence/severe
+
+airspeed: install  ## which airspeed a law should compute with: docs/answers/airspeed.md (two minutes)
+	$(BIN)/harness run experiments/airspeed.toml --out out/airspeed --log none
+	$(BIN)/python -m harness.studies.airspeed out/airspeed
 
 notebook: install  ## execute docs/guide/notebook.ipynb anew: its outputs are what it says
 	$(BIN)/python docs/execute_notebook.py docs/guide/notebook.ipynb

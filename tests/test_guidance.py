@@ -171,8 +171,23 @@ def test_every_answer_is_finite_for_every_finite_observation(
 def test_ground_takes_the_airspeed_from_ground_velocity_and_estimated_wind(direction: str) -> None:
     o = moment(0.0)._replace(velocity_north=9.0, velocity_east=-2.0, wind_north=3.0, wind_east=6.0)
     by_ground = law("nftsm", airspeed="ground", direction=direction)
-    told = law("nftsm", direction=direction)
+    told = law("nftsm", direction=direction, airspeed="nominal")
     assert fly_at(o, by_ground) == fly_at(o._replace(nominal_airspeed=10.0), told) != fly_at(o, told)
+
+
+@settings(max_examples=100)
+@given(v=st.tuples(*[st.floats(-30.0, 30.0)] * 4))
+def test_with_ground_the_range_rate_is_that_of_the_ground_velocity_however_wrong_the_wind(
+    v: tuple[float, float, float, float],
+) -> None:
+    v_n, v_e, wind_n, wind_e = v
+    o = moment(0.0)._replace(velocity_north=v_n, velocity_east=v_e, wind_north=wind_n, wind_east=wind_e)
+    psi_a = math.atan2(v_e - wind_e, v_n - wind_n)
+    x, y = o.north - o.target_north, o.east - o.target_east
+    away = (v_n - o.target_velocity_north) * x + (v_e - o.target_velocity_east) * y
+    assert relative_motion(o, R_D, AIRSPEEDS["ground"](o), psi_a)[1] == pytest.approx(
+        away / math.hypot(x, y), abs=2e-3 if math.hypot(v_n - wind_n, v_e - wind_e) < 2e-3 else 1e-9
+    )
 
 
 def test_the_singular_paper_set_is_finite_exactly_on_the_circle() -> None:
@@ -237,7 +252,7 @@ def test_measured_airspeed_is_what_the_law_then_computes_with() -> None:
     o = moment(0.0)._replace(airspeed=12.0)
     slow = o._replace(nominal_airspeed=12.0)
     measured = fly_at(o, law("nftsm", "paper_1", airspeed="measured", max_heading_rate=1e9))
-    nominal = fly_at(slow, law("nftsm", "paper_1", max_heading_rate=1e9))
+    nominal = fly_at(slow, law("nftsm", "paper_1", airspeed="nominal", max_heading_rate=1e9))
     assert measured == nominal
 
 
