@@ -7,7 +7,7 @@ from inspect import signature
 from types import MappingProxyType
 from typing import NamedTuple
 
-from autopilot import l1, lgvf, nftsm, npfg, orbit_field, smc
+from autopilot import l1, lgvf, lq_orbit, nftsm, nftsm_lead, npfg, orbit_field, smc
 from autopilot.guidance import Law
 from autopilot.rules import Rule
 
@@ -38,6 +38,8 @@ LAWS: Mapping[str, LawKind] = MappingProxyType(
             nftsm.Nftsm, nftsm.GAIN_SETS, "fitted", nftsm.RULES, MappingProxyType({"identified": "fitted"})
         ),
         "smc": LawKind(smc.Smc, smc.GAIN_SETS, "paper", smc.RULES),
+        "nftsm_lead": LawKind(nftsm_lead.NftsmLead, nftsm_lead.GAIN_SETS, "calm", nftsm_lead.RULES),
+        "lq_orbit": LawKind(lq_orbit.LqOrbit, lq_orbit.GAIN_SETS, "slow", lq_orbit.RULES),
         "l1": LawKind(l1.L1, l1.GAIN_SETS, "published", l1.RULES),
         "npfg": LawKind(npfg.Npfg, npfg.GAIN_SETS, "published", npfg.RULES),
         "lgvf": LawKind(lgvf.Lgvf, lgvf.GAIN_SETS, "published", lgvf.RULES),

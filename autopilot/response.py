@@ -111,7 +111,7 @@ class Response:
 
         From a command held for `period` seconds to the output's first and second integral at the sampling instants.
         """
-        periods, step, now, earlier = _held(self, period)
+        periods, step, now, earlier = held(self, period)
         n = len(now) - 2
         drive = np.multiply.outer(z, now) + earlier  # times 1/z: the command of this period and of the one before
         left = z[:, np.newaxis, np.newaxis] * np.eye(n + 2) - step
@@ -119,11 +119,11 @@ class Response:
 
 
 @lru_cache(maxsize=64)
-def _held(response: Response, period: float) -> tuple[int, Array, Array, Array]:
+def held(response: Response, period: float) -> tuple[int, Array, Array, Array]:
     """A response, its integral and that one's, under commands held for `period`, s.
 
     The whole periods in its delay; how a period moves the states; what the command of this period and the one before
-    add to them.
+    add to them. The states are those of `matrices`, then the two integrals.
     """
     A, b, c = response.matrices()
     n = len(b)

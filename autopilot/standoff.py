@@ -56,6 +56,23 @@ def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Mot
     return L - R_d, r_dot, lam_dot, psi_a_err if -pi <= psi_a_err < pi else wrap(psi_a_err), psi_a_d_dot
 
 
+def feed_forward_ahead(o: Observation, motion: Motion, R_d: float, v_a: float, psi_a: float, time: float) -> float:
+    """The rate of the desired heading in `time` seconds, rad/s, if the aircraft goes on around the target as now."""
+    _, _, lam_dot, _, psi_a_d_dot = motion
+    x, y, *own, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now = o
+    x_r, y_r, turned = x - x_t, y - y_t, lam_dot * time
+    cos_turned, sin_turned = cos(turned), sin(turned)
+    if a_t or omega_t:
+        v_t = hypot(v_t_x, v_t_y)
+        faster = max(0.0, 1.0 + a_t * time / v_t) if v_t else 1.0
+        cos_t, sin_t = faster * cos(omega_t * time), faster * sin(omega_t * time)
+        v_t_x, v_t_y = v_t_x * cos_t - v_t_y * sin_t, v_t_x * sin_t + v_t_y * cos_t
+    x, y = x_t + x_r * cos_turned - y_r * sin_turned, y_t + x_r * sin_turned + y_r * cos_turned
+    later = Observation._make((x, y, *own, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now))
+    _, _, lam_dot, _, psi_a_d_dot = relative_motion(later, R_d, v_a, psi_a + (lam_dot + psi_a_d_dot) * time)
+    return lam_dot + psi_a_d_dot
+
+
 def course_rate_ratio(v_a: float, psi_a: float, W_x: float, W_y: float) -> float:
     """L(psi_a) of Eq. (3): the course rate over heading rate, for |wind| < v_a. Above 1/2; above 1 in a headwind."""
     along = v_a * (W_x * cos(psi_a) + W_y * sin(psi_a))
@@ -134,10 +151,15 @@ def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
     return limited_step(law, answer)
 
 
-def limited_step(law: StandoffLaw, answer: Callable[[Observation, float, float], Answer]) -> LawStep:
+def limited_step(
+    law: StandoffLaw,
+    answer: Callable[[Observation, float, float], Answer],
+    applied: Callable[[float, float], None] | None = None,
+) -> LawStep:
     """A law in flight, with the airspeed, the limit and the direction that it is set to.
 
-    `answer` gets the observation, v_a and psi_a, and answers for the paper's sense of circling.
+    `answer` gets the observation, v_a and psi_a, and answers for the paper's sense of circling. `applied` tells a law
+    with memory what became of its answer: the limited command and the equally limited feed-forward, rad/s.
     """
     max_rate = law.max_heading_rate
     airspeed, by_course = AIRSPEEDS[law.airspeed], law.command == "course_rate"
@@ -153,6 +175,8 @@ def limited_step(law: StandoffLaw, answer: Callable[[Observation, float, float],
         r, s, heading_error, feed_forward, rest = answer(o, v_a, psi_a)
         unlimited = feed_forward + rest
         limited = unlimited if -limit < unlimited < limit else copysign(limit, unlimited)
+        if applied:
+            applied(limited, max(-limit, min(limit, feed_forward)))
         return _guidance((limited, r, s, heading_error, feed_forward, unlimited))
 
     return step if law.direction == "paper" else lambda o: _mirror_guidance(step(_mirror_observation(o)))

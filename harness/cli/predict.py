@@ -32,7 +32,7 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
     from harness.checks import airframe_of
     from harness.cli._input import BadInput, flight_of, read_file
     from harness.limit_cycle.margin import ENOUGH, following
-    from harness.limit_cycle.prediction import Loop, boundary, limit_cycle
+    from harness.limit_cycle.prediction import Loop, boundary
     from harness.plants.identified import IdentifiedError, identified
 
     settings = read_file(file, overrides)
@@ -43,24 +43,27 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
         raise BadInput(f"{settings.locate('start.airspeed')}: {error}") from None
     law = flight.law
     loop = Loop(law, one.heading_rate, flight.start.airspeed, flight.guidance_period)
-    try:
-        cycle = limit_cycle(loop)
-    except ValueError as error:
-        raise BadInput(f"{settings.locate('law.max_heading_rate')}: {error}") from None
+    found = following(flight)
+    if loop.law.max_heading_rate <= abs(loop.turn):
+        raise BadInput(f"{settings.locate('law.max_heading_rate')}: {found.reason}")
     bandwidth = loop.response.bandwidth
     click.echo(
         f"{flight.aircraft} at {flight.start.airspeed:g} m/s: bandwidth {bandwidth:.3g} rad/s, "
         f"critical gain {critical_gain(loop.response, loop.period)[0]:.3g} 1/s with a command held {loop.period:g} s"
     )
-    if cycle is None:
+    cycle = found.cycle
+    if found.reason:
+        click.echo(f"unknown: {found.reason}")
+    elif cycle is None:
         click.echo("no limit cycle: the command oscillates by less than 0.5 deg/s")
+    elif not cycle.is_known:
+        click.echo("limit cycle: there is one; of a law with memory its frequency and size are not predicted")
     else:
         click.echo(
             f"limit cycle: {cycle.frequency:.3g} Hz, heading rate ±{math.degrees(cycle.heading_rate):.3g} deg/s, "
             f"command ±{math.degrees(cycle.command):.3g} deg/s, range error "
             f"{cycle.range_mean:.3g} ±{cycle.range_error:.3g} m"
         )
-    found = following(flight)
     if found.crossover and found.crossover_gain and found.crossover_delay and found.phase_margin is not None:
         click.echo(
             f"crossover of law and inner loop: {found.crossover:.3g} rad/s, where the heading rate is "
@@ -70,7 +73,7 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
         )
     if found.margin is not None:
         click.echo(f"margin to the limit cycle: {found.margin:.3g} times the law's gain ({ENOUGH:g} or more is asked)")
-    if isinstance(law, Nftsm):
+    if type(law) is Nftsm:
         quicker = boundary(lambda q: replace(loop, response=loop.response.quicker(q)), 4.0)
         gains = boundary(lambda q: replace(loop, law=replace(law, k2=q * law.k2, k3=q * law.k3)), 0.3)
         if math.isfinite(quicker):

@@ -5,6 +5,7 @@ the limit cycle begins, its gain margin with the law's own nonlinearity in it. B
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,6 +14,7 @@ import aircraft
 from autopilot.guidance import Law
 from autopilot.response import critical_gain
 from harness.flight import Flight
+from harness.limit_cycle.linear import NO_LINEARISATION, crossing_and_margin, has_memory, linearised
 from harness.limit_cycle.prediction import Crossover, LimitCycle, Loop, boundary, crossover, limit_cycle
 from harness.plants.identified import IdentifiedError, Sweep, identified
 
@@ -39,7 +41,7 @@ class Following:
     crossover_delay: float | None = None  # s: phase lag there over the frequency
     phase_margin: float | None = None  # rad, of that loop
     margin: float | None = None  # factor on the law's gain until the limit cycle begins; inf when none begins
-    cycle: LimitCycle | None = None  # None when there is none, as well
+    cycle: LimitCycle | None = None  # None when there is none, as well; of a law with memory its numbers are NaN
 
     @property
     def chatters(self) -> bool | None:
@@ -71,9 +73,9 @@ def following_of(law: Law, airframe: Path, airspeed: float, period: float) -> Fo
 
 @lru_cache(maxsize=4096)
 def _following(loop: Loop, sweep: Sweep | None) -> Following:
-    if not _is_held(loop):
-        return Following(reason="the circle cannot be held: the heading-rate limit is below what it takes")
-    crossing, margin = _crossing_and_margin(loop)
+    if reason := _why_unknown(loop):
+        return Following(reason=reason)
+    crossing, margin, cycle = _judged(loop)
     gain, phase = sweep.at(crossing.frequency) if sweep and crossing else (math.nan, math.nan)
     return Following(
         reason="",
@@ -83,7 +85,7 @@ def _following(loop: Loop, sweep: Sweep | None) -> Following:
         crossover_delay=_known(-phase / crossing.frequency) if crossing else None,
         phase_margin=crossing.phase_margin if crossing else None,
         margin=_known(margin),
-        cycle=None if margin > _CALM else limit_cycle(loop),
+        cycle=cycle() if margin <= _CALM else None,
     )
 
 
@@ -94,17 +96,25 @@ def margin_of(flight: Flight) -> float | None:
     except IdentifiedError:
         return None
     loop = Loop(flight.law, found.heading_rate, flight.start.airspeed, flight.guidance_period)
-    return _known(_crossing_and_margin(loop)[1]) if _is_held(loop) else None
+    return None if _why_unknown(loop) else _known(_judged(loop)[1])
 
 
 @lru_cache(maxsize=4096)
-def _crossing_and_margin(loop: Loop) -> tuple[Crossover | None, float]:
+def _judged(loop: Loop) -> tuple[Crossover | None, float, Callable[[], LimitCycle | None]]:
+    """Crossover, margin, and the search for the limit cycle: of a law with memory only whether there is one."""
+    if law := linearised(loop):
+        return *crossing_and_margin(loop, law), lambda: LimitCycle(*(math.nan,) * 5)
     crossing = crossover(loop)
-    return crossing, gain_margin(loop, crossing.gain if crossing else None)
+    margin = gain_margin(loop, crossing.gain if crossing else None)
+    return crossing, margin, lambda: limit_cycle(loop)
 
 
-def _is_held(loop: Loop) -> bool:
-    return loop.law.max_heading_rate > abs(loop.turn)
+@lru_cache(maxsize=4096)
+def _why_unknown(loop: Loop) -> str:
+    """Why nothing is predicted of the loop; empty when it is."""
+    if loop.law.max_heading_rate <= abs(loop.turn):
+        return "the circle cannot be held: the heading-rate limit is below what it takes"
+    return "" if linearised(loop) or not has_memory(loop) else NO_LINEARISATION
 
 
 def gain_margin(loop: Loop, gain: float | None = None) -> float:

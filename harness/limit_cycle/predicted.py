@@ -8,8 +8,15 @@ import aircraft
 from harness.error import HarnessError
 from harness.flight import Flight
 from harness.limit_cycle.margin import Following, following, margin_of
+from harness.limit_cycle.prediction import LimitCycle
 from harness.plants.identified import is_stale
 from harness.plants.ladder import PLANTS
+
+
+def _known(found: Following) -> LimitCycle | None:
+    """The predicted limit cycle, where its numbers are known."""
+    return found.cycle if found.cycle and found.cycle.is_known else None
+
 
 MARGIN = "limit_cycle_margin"
 LARGEST = 99.0  # a margin beyond it is written as this: it decides nothing more
@@ -19,9 +26,9 @@ PREDICTED: Mapping[str, Callable[[Following], float | None]] = MappingProxyType(
         "heading_rate_gain_slow": lambda found: found.low_frequency_gain,
         "heading_rate_delay_s": lambda found: found.crossover_delay,
         MARGIN: lambda found: None if found.margin is None else min(found.margin, LARGEST),
-        "predicted_cycle_hz": lambda found: found.cycle.frequency if found.cycle else None,
+        "predicted_cycle_hz": lambda found: cycle.frequency if (cycle := _known(found)) else None,
         "predicted_cycle_amplitude_deg_s": lambda found: (
-            math.degrees(found.cycle.heading_rate) if found.cycle else None
+            math.degrees(cycle.heading_rate) if (cycle := _known(found)) else None
         ),
     }
 )

@@ -43,6 +43,11 @@ class LimitCycle(NamedTuple):
     range_mean: float
     range_error: float  # amplitude
 
+    @property
+    def is_known(self) -> bool:
+        """Whether its numbers are known, and not only that there is one."""
+        return not math.isnan(self.frequency)
+
 
 @dataclass(frozen=True, slots=True)
 class Loop:

@@ -1,0 +1,90 @@
+"""The margin of a law with memory, from the linearisation that it gives."""
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from autopilot.linear import Array, Linear
+from autopilot.response import held
+from harness.chatter import VISIBLE
+from harness.limit_cycle.prediction import Crossover, Loop
+
+NO_LINEARISATION = "the law has memory, and no method `linearised` that says what it does to a small oscillation"
+_TRIED = 7  # points at which a law is asked twice
+
+
+def linearised(loop: Loop) -> Linear | None:
+    """The loop's law from (heading error, range error) to its command, as it gives it; None where it gives none."""
+    own: Callable[[Any, float], Linear] | None = getattr(loop.law, "linearised", None)
+    return own(loop.context, VISIBLE) if own else None
+
+
+def has_memory(loop: Loop) -> bool:
+    """Whether the loop's law answers otherwise when it was asked before."""
+    e = np.linspace(-0.01, 0.02, _TRIED)
+    r = np.linspace(0.3, -0.2, _TRIED)
+    alone = [loop.commands(e[i : i + 1], r[i : i + 1])[0] for i in range(_TRIED)]
+    return bool(loop.commands(e, r).tolist() != alone)
+
+
+def crossing_and_margin(loop: Loop, law: Linear) -> tuple[Crossover | None, float]:
+    """Crossover and margin of the loop with a law that gives this linearisation.
+
+    A gain can be the border only where the loop, opened at the command, has the phase of a sustained oscillation; of
+    those the margin is the next above 1 of a stable loop, and below 1 that of an unstable one: inf and NaN where there
+    is none.
+    """
+    omega = math.pi / loop.period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
+    z = np.exp(1j * omega * loop.period)
+    H, J = loop.response.sampled(loop.period, z).T
+    of_e, of_r = law.at(z)[:, 0, :].T
+    by_error = of_e + of_r * loop.airspeed * J / H  # the law's command over the heading error
+    once_round = loop.gain * by_error * H  # 1 where an oscillation sustains itself
+    above = np.flatnonzero((np.abs(once_round[:-1]) >= 1.0) & (np.abs(once_round[1:]) < 1.0))
+    crossover = None
+    if above.size:
+        i = int(above[-1])
+        crossover = Crossover(float(omega[i]), float(np.angle(once_round[i])), float(abs(by_error[i])))
+
+    turned = np.sign(once_round.imag[1:]) != np.sign(once_round.imag[:-1])
+    turned[-1] = True  # at half the sampling frequency it is real
+    at = np.flatnonzero(turned & (once_round.real[1:] > 0.0)) + 1
+    borders = sorted(1.0 / once_round.real[at])
+    if _is_stable(loop, law, 1.0):
+        return crossover, float(next((border for border in borders if border > 1.0), math.inf))
+    below = [0.0, *(border for border in borders if border <= 1.0)]
+    for lower, border in reversed(list(pairwise(below))):
+        if _is_stable(loop, law, 0.5 * (lower + border)):
+            return crossover, float(border)
+    return crossover, math.nan
+
+
+def _is_stable(loop: Loop, law: Linear, times: float) -> bool:
+    """Whether the closed loop is, with so many times the gain of the law."""
+    F, g, H = _aircraft(loop)
+    D = times * loop.gain * law.D @ H
+    closed = np.block([[F + g * D, g * (times * loop.gain * law.C)], [law.B @ H, law.A]])
+    return bool(np.abs(np.linalg.eigvals(closed)).max() < 1.0)
+
+
+def _aircraft(loop: Loop) -> tuple[Array, Array, Array]:
+    """The sampled response as matrices: of the states, of the command, and from the states to (heading, range) error.
+
+    The states are those of `held`, then the commands that still wait, latest first.
+    """
+    periods, step, now, earlier = held(loop.response, loop.period)
+    n = len(step)
+    m = n + periods + 1
+    F, g, H = np.zeros((m, m)), np.zeros((m, 1)), np.zeros((2, m))
+    F[:n, :n], F[:n, -1] = step, earlier
+    if periods:
+        F[:n, -2] = now
+    else:
+        g[:n, 0] = now
+    g[n, 0] = 1.0
+    F[range(n + 1, m), range(n, m - 1)] = 1.0
+    H[0, n - 2], H[1, n - 1] = 1.0, loop.airspeed
+    return F, g, H
