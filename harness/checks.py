@@ -72,7 +72,7 @@ def problems(flight: Flight) -> list[Problem]:
         not_multiple = f"{flight.errors.command_delay:g} s is not a whole multiple of step_s, {flight.step:g} s"
         mistakes.append(Problem("errors.command_delay", not_multiple, ("step",)))
     if 0.0 < flight.errors.actuator_lag < 0.5 * flight.step:
-        quick = f"{flight.errors.actuator_lag:g} s is too quick for steps of {flight.step:g} s, must be 0 or half a step"
+        quick = f"{flight.errors.actuator_lag:g} s is too quick for steps of {flight.step:g} s: 0 or half a step"
         mistakes.append(Problem("errors.actuator_lag", quick, ("step",)))
     speed = math.hypot(*flight.wind.steady)
     if speed >= flight.start.airspeed:

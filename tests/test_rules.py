@@ -3,15 +3,18 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import aircraft
 import harness
 from autopilot.laws import LAWS
 from autopilot.rules import RuleError
+from harness.cli.main import harness as cli
 from harness.error import ArgumentError, SettingsError
 from harness.flight import Flight
 from harness.limit_cycle.margin import margin_of
@@ -23,6 +26,7 @@ from harness.settings.gains import by_rule
 from harness.settings.written import document
 from harness.world.target import Target
 from harness.world.wind import Wind
+from tests.builders import write
 
 AIRSPEEDS = {"ultra_stick_25e": 13.0, "skywalker_x8": 13.0, "aerosonde": 25.0}
 
@@ -109,3 +113,21 @@ def test_python_gives_the_flight_for_a_rule() -> None:
         harness.law("nftsm", "scaled")
     with pytest.raises(RuleError, match="no airframe"):
         by_rule(replace(flight, law=replace(own, gains="behind_inner_loop"), aircraft="no such"), ())
+
+
+def test_compare_and_report_say_which_rule_gave_which_numbers(tmp_path: Path) -> None:
+    experiment = write(
+        tmp_path / "scaled.toml",
+        '[flight]\nduration_s = 2.0\nlaw = { name = "nftsm", gains = "scaled", standoff_m = 400.0 }\n'
+        '[matrix]\nplant = ["kinematic", "lagged"]\n"law.k3" = [1.0, 3.0]\n',
+    )
+    harness.run(experiment, tmp_path / "out", workers=0)
+    told = (
+        "Gains of nftsm by the rule scaled, from fitted: k1 = 0.025, k2 = 6, k3 = 1 "
+        "(ultra_stick_25e, 13 m/s, circle of 400 m); k1 = 0.025, k2 = 6, k3 = 3 "
+        "(ultra_stick_25e, 13 m/s, circle of 400 m)."
+    )
+    assert told in harness.compare(tmp_path / "out").answer.splitlines()
+    report = CliRunner().invoke(cli, ["report", str(tmp_path / "out"), "--out", str(tmp_path / "page.html")])
+    assert report.exit_code == 0
+    assert told in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -21,7 +21,7 @@ AIRSPEEDS = ("nominal", "measured", "ground")
 _CONDITION = ["aircraft", "wind_speed_mps", "wind.turbulence"]
 
 
-class Line(NamedTuple):
+class ByAirspeed(NamedTuple):
     """An airframe in one air: the means over the seeds by the airspeed that the law computes with."""
 
     airframe: str
@@ -37,7 +37,7 @@ class Line(NamedTuple):
         return max(self.error) - min(self.error)
 
 
-def lines(flights: "pd.DataFrame") -> Iterator[Line]:
+def lines(flights: "pd.DataFrame") -> Iterator[ByAirspeed]:
     """One for each airframe in each air, in the order in which they were set."""
     speeds = [(north**2 + east**2) ** 0.5 for north, east in flights["wind.steady_mps"]]
     table = flights.assign(wind_speed_mps=speeds)
@@ -45,7 +45,7 @@ def lines(flights: "pd.DataFrame") -> Iterator[Line]:
         by_seed = group.pivot_table(index="seed", columns="law.airspeed", values="range_error_rms_m")
         activity = group.groupby("law.airspeed")["command_activity_deg_s2"].mean()
         wind = f"wind of {speed:g} m/s" if speed else "no wind"
-        yield Line(
+        yield ByAirspeed(
             airframe=str(airframe),
             air=f"{wind}, {severity} turbulence" if severity != "none" else wind,
             flights=len(by_seed),

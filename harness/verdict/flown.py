@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from autopilot.laws import LAWS
 from harness.log.metric import METRICS
 from harness.tables import number, table
 from harness.verdict.comparison import Comparison
@@ -35,6 +36,27 @@ class Flown(NamedTuple):
     cycling: Shares
     medians: tuple[float | None, ...]  # of `TOLD`
     keys: tuple[str, ...]
+
+
+def gains_by_rule(flights: pd.DataFrame) -> Iterator[str]:
+    """Which rule gave which numbers, a sentence for each gain set that follows from a rule."""
+    for (name, gains), rows in flights.groupby(["law.name", "law.gains"], sort=False):
+        kind = LAWS.get(str(name))
+        if kind is None or gains not in kind.rules:
+            continue
+        base = kind.numbers(str(gains))
+        decided = [gain for gain in base if (rows[f"law.{gain}"] != base[gain]).any()]
+        given = rows.drop_duplicates(["aircraft", *(f"law.{gain}" for gain in decided)])
+        each = [_given_by_rule(row, decided) for _, row in given.iterrows()]
+        more = f"; and {len(each) - MOST_VALUES} more" if len(each) > MOST_VALUES else ""
+        rule = f"{gains}, from {kind.rules[str(gains)].base}"
+        yield f"Gains of {name} by the rule {rule}: {'; '.join(each[:MOST_VALUES])}{more}."
+
+
+def _given_by_rule(row: pd.Series, decided: list[str]) -> str:
+    numbers = ", ".join(f"{gain} = {number(row['law.' + gain])}" for gain in decided)
+    circle = f"{number(row['start.airspeed_mps'])} m/s, circle of {number(row['law.standoff_m'])} m"
+    return f"{numbers or 'unchanged'} ({row['aircraft']}, {circle})"
 
 
 def combinations(comparison: Comparison) -> tuple[list[str], list[Flown]]:
