@@ -17,7 +17,6 @@ from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
 PAPER_STANDOFF, PAPER_AIRSPEED = 200.0, 13.0  # m, m/s: of the circle and the aircraft of Table 1
-_POINTS = 360  # on the circle
 _CLOSEST = 1e-6  # m: at a smaller distance the azimuth has no meaning; it also bounds the rate of the azimuth
 
 
@@ -89,20 +88,6 @@ def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> flo
     """psi_a, rad, from the course, for a UAV without air data. A crosswind above v_a counts as v_a."""
     across = (W_x * sin(chi_a) - W_y * cos(chi_a)) / v_a
     return wrap(chi_a + asin(max(-1.0, min(1.0, across))))
-
-
-def holding_course_rate(R_d: float, v_a: float, W_x: float, W_y: float, v_t_x: float, v_t_y: float) -> float:
-    """The largest course rate, rad/s, on the circle around a target of steady velocity, by Eq. (3), (5), (7)."""
-    w_x, w_y = W_x - v_t_x, W_y - v_t_y  # the air against the target
-    along_wind, most = atan2(w_y, w_x), 0.0
-    for i in range(_POINTS):
-        lam = along_wind + 2.0 * pi * i / _POINTS
-        across = w_x * sin(lam) - w_y * cos(lam)
-        if abs(across) < v_a:
-            towards = sqrt(v_a * v_a - across * across)  # v_a cos(bar psi_a^d)
-            rate = (towards + w_x * cos(lam) + w_y * sin(lam)) ** 2 / (towards * R_d)  # |lam_dot + psi_a_d_dot|
-            most = max(most, rate * course_rate_ratio(v_a, lam + asin(across / v_a), W_x, W_y))
-    return most
 
 
 _SLOWEST = 1e-3  # m/s: no airspeed that a law computes with is smaller

@@ -3,13 +3,18 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 import aircraft
-from autopilot.standoff import holding_course_rate
 from harness.flight import Flight, setup_of
 from harness.plants.ladder import PLANTS
 from harness.plants.turn import bank_of_turn
 from harness.world.target import TargetState
+
+Array = NDArray[np.float64]
+
+_POINTS = 72  # on the circle
+_AT_ONCE = 1000  # rows
 
 
 def target_states(flight: Flight) -> list[TargetState]:
@@ -36,18 +41,49 @@ def is_outrun(flight: Flight) -> bool:
 
 
 def needed_rate(flight: Flight) -> float:
-    """The largest rate needed to hold the circle, rad/s, of the quantity that the law limits; infinite if none does.
+    """The largest rate needed to hold the circle, rad/s, of the quantity that the law limits; infinite if none does."""
+    velocities = {(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight)}
+    return float(needed_rates(flight, np.array(flight.wind.steady), np.array(sorted(velocities))).max())
 
-    The heading rate is (v_a + w)^2 / (v_a R_d), with w the relative speed. The course rate needed is smaller: with a
-    target at rest it is (v_a + w) / R_d.
+
+def needed_rates(flight: Flight, wind: Array, target_velocity: Array) -> Array:
+    """The largest rate needed to hold the circle in each of these winds and at each velocity of the target, m/s.
+
+    Both have rows of (north, east), or one is a single pair. The rate is of the quantity that the law limits, rad/s,
+    and infinite where the aircraft does not get round. The heading rate is (v_a + w)^2 / (v_a R_d), with w the relative
+    speed. The course rate needed is smaller: with a target at rest it is (v_a + w) / R_d.
     """
-    if is_outrun(flight):
-        return math.inf
-    v_a = flight.start.airspeed
+    v_a, R_d = flight.start.airspeed, flight.law.standoff
+    wind, target_velocity = np.broadcast_arrays(np.atleast_2d(wind), np.atleast_2d(target_velocity))
+    w = np.hypot(*(wind - target_velocity).T)
+    rates = (v_a + w) ** 2 / (v_a * R_d)
+    held = w < v_a * (1.0 - 1e-9)  # more is rounding
     if flight.law.command == "course_rate":
-        velocities = {(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight)}
-        return max(holding_course_rate(flight.law.standoff, v_a, *flight.wind.steady, *v) for v in velocities)
-    return (v_a + relative_speed(flight)) ** 2 / (v_a * flight.law.standoff)
+        for rows in np.array_split(np.flatnonzero(held), 1 + len(w) // _AT_ONCE):
+            rates[rows] = _holding_course_rates(R_d, v_a, wind[rows], target_velocity[rows])
+    return np.where(held, rates, np.inf)
+
+
+def _holding_course_rates(R_d: float, v_a: float, wind: Array, target_velocity: Array) -> Array:
+    """The largest course rate on the circle, by Eq. (3), (5), (7), of targets of steady velocity. Needs w < v_a."""
+    (W_x, W_y), (w_x, w_y) = wind.T[..., np.newaxis], (wind - target_velocity).T[..., np.newaxis]
+    lam = np.arctan2(w_y, w_x) + math.tau * np.arange(_POINTS) / _POINTS
+    across = w_x * np.sin(lam) - w_y * np.cos(lam)
+    towards = np.sqrt(v_a * v_a - across * across)  # v_a cos(bar psi_a^d)
+    psi_a = lam + np.arcsin(across / v_a)
+    along = v_a * (W_x * np.cos(psi_a) + W_y * np.sin(psi_a))
+    ratio = (v_a * v_a + along) / (v_a * v_a + W_x * W_x + W_y * W_y + 2.0 * along)  # L(psi_a) of Eq. (3)
+    rate = (towards + w_x * np.cos(lam) + w_y * np.sin(lam)) ** 2 / (towards * R_d) * ratio  # |lam_dot + psi_a_d_dot| L
+    i, each = np.argmax(rate, axis=1), np.arange(len(rate))
+    before, most, after = (rate[each, (i + k) % _POINTS] for k in (-1, 0, 1))
+    bend = np.maximum(2.0 * most - before - after, 1e-300)
+    return np.asarray(most + 0.125 * (after - before) ** 2 / bend)  # of the parabola through three points
+
+
+def margins_in_flight(flight: Flight, wind: Array, target_velocity: Array) -> Array:
+    """The limit minus the rate needed to hold the circle in each wind round each target, as `needed_rates`."""
+    needed = needed_rates(flight, wind, target_velocity)
+    return np.where(np.isfinite(needed), flight.law.max_heading_rate - needed, -np.inf)
 
 
 def feasibility_margin(flight: Flight) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from autopilot.guidance import Context, Guidance, LawStep, Observation, started
 from harness.checks import problems
+from harness.feasibility import margins_in_flight
 from harness.flight import Flight, air_of, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, heading_in, perfect_estimator
 from harness.log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
@@ -101,12 +102,14 @@ def command(law: LawStep, observation: Observation) -> Guidance:
 
 
 def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | None) -> FlightLog:
-    """The log with the columns that the loop does not write: the true range error, and the target as the law saw it.
+    """The log with the columns that the loop does not write: range error, margin, and the target as the law saw it.
 
     `estimates` are the rows of an `Estimation`; None stands for a law that knows the true position and velocity.
     """
     x_r, y_r = log["north"] - log["target_north"], log["east"] - log["target_east"]
     log["range_error"][:] = np.sqrt(x_r * x_r + y_r * y_r) - log.flight.law.standoff  # the arithmetic of the laws
+    wind, velocity = (np.column_stack([log[f"{of}_north"], log[f"{of}_east"]]) for of in ("wind", "target_velocity"))
+    log["feasibility_margin"][:] = margins_in_flight(log.flight, wind, velocity)
     seen = log.table[:, COLUMNS.index(SEEN_COLUMNS[0]) :]
     if estimates is None:
         first = COLUMNS.index(TargetState._fields[0])

@@ -30,7 +30,7 @@ SEEN_COLUMNS = (
     *Estimate._fields[4:],
     *(f"innovation_{name}" for name in Measurement._fields),
 )
-COLUMNS = (*LOOP_COLUMNS, "range_error", *SEEN_COLUMNS)  # the range error is the true one
+COLUMNS = (*LOOP_COLUMNS, "range_error", "feasibility_margin", *SEEN_COLUMNS)  # the range error is the true one
 # The columns of the digest: motion of aircraft and target, and the command. They are listed by name, so that a new
 # column of the log does not change any digest.
 TRAJECTORY = (
@@ -68,6 +68,8 @@ class FlightLog:
       `feed_forward`: its part that no error makes.
     - `range_error`: distance to the target minus the standoff distance; `range_error_seen`: the same as the law knows
       it; `sliding_variable`, `heading_error`: the law's own, rad.
+    - `feasibility_margin`: the limit of the command minus the rate that the circle takes in this air and round this
+      target, rad/s, each as if it stayed so; -inf where no rate holds it.
     - `target_north_seen`, `target_east_seen`, `target_velocity_north_seen`, `target_velocity_east_seen`: the target as
       the law knows it; `target_north_variance`, `target_east_variance`, `target_velocity_north_variance`,
       `target_velocity_east_variance`: of the estimate; `innovation_range`, `innovation_azimuth`: of the latest

@@ -140,6 +140,14 @@ _METRICS = (
         of_circling=True,
     ),
     Metric(
+        name="infeasible_s",
+        unit="s",
+        meaning="time with a negative feasibility margin: air and target ask more than the limit of the command",
+        measure=lambda signals: float(np.sum(signals.log["feasibility_margin"][:-1] < 0.0)) * signals.period,
+        heading="infeasible",
+        compared=False,
+    ),
+    Metric(
         name="convergence_time_half_tolerance_s",
         unit="s",
         meaning="convergence time at half the tolerance; a difference that changes sign with it rests on the tolerance",

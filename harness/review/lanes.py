@@ -118,7 +118,7 @@ def events(log: FlightLog, lanes: Mapping[str, Sequence[Change]], shared: bool =
     """
     if not len(log):
         return [Event(0.0, "WARN", _end_text(log))]
-    events = [*_crossing(log), *(_gust(log) if shared else ())]
+    events = [*_crossing(log), *_feasible(log), *(_gust(log) if shared else ())]
     for name, changes in lanes.items():
         if not shared and name in ("air", "target"):
             continue
@@ -211,6 +211,25 @@ def _crossing(log: FlightLog) -> Iterator[Event]:
         yield Event(float(log["time"][crossed[0]]), "INFO", "crosses the circle for the first time")
         worst = crossed[np.abs(error[crossed]).argmax()]
         yield Event(float(log["time"][worst]), "INFO", f"largest overshoot, {abs(error[worst]):.3g} m")
+
+
+def _feasible(log: FlightLog) -> Iterator[Event]:
+    """Where the circle cannot be held from then on, and where it can again."""
+    is_held = log["feasibility_margin"] >= 0.0
+    changed = np.flatnonzero(np.append(not is_held[0], is_held[1:] != is_held[:-1]))
+    if len(changed) > MOST_EVENTS:
+        text = f"the circle cannot be held; then {len(changed) - 1} changes"
+        yield Event(float(log["time"][changed[0]]), "WARN", text)
+        return
+    for row in changed:
+        time, margin = float(log["time"][row]), math.degrees(log["feasibility_margin"][row])
+        if is_held[row]:
+            yield Event(time, "INFO", "the circle can be held again")
+        else:
+            lacking = (
+                f"the command's limit is {-margin:.3g} deg/s too small" if math.isfinite(margin) else "at any rate"
+            )
+            yield Event(time, "WARN", f"the circle cannot be held: {lacking}")
 
 
 def _gust(log: FlightLog) -> Iterator[Event]:

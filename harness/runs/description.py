@@ -86,6 +86,9 @@ def ending(row: Mapping[str, Any]) -> Iterator[str]:
             if settled is None
             else f"The flight settled on its circle within {tolerance:g} m in {number(settled)} s."
         )
+    if infeasible := row["metrics"].get("infeasible_s"):  # none in a row of an earlier version
+        asked = "air and target ask more than the command's limit"
+        yield f"For {infeasible:.4g} s of it the circle could not be held: {asked}."
 
 
 def changes(now: Mapping[str, Any], then: Mapping[str, Any]) -> dict[str, tuple[object, object]]:
