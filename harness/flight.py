@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Gt, Le
 
@@ -12,10 +12,13 @@ from autopilot.guidance import Context, Law, uses_response
 from autopilot.quantities import About, Metres, OneOf, Seconds
 from harness.flight_errors import Errors
 from harness.plants.ladder import PLANTS, Setup
-from harness.plants.plant import Plant, Start
+from harness.plants.plant import Plant, PlantError, Start
 from harness.world.air import Air
 from harness.world.target import Target
 from harness.world.wind import Wind
+
+if TYPE_CHECKING:
+    from autopilot.response import Response
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,14 +87,22 @@ def context_of(flight: Flight) -> Context:
     """What the flight's law knows before it flies; the response of an airframe that is not identified is None."""
     response = None
     if uses_response(flight.law):
-        from harness.plants.identified import IdentifiedError, identified  # late: most laws need none
-
-        with suppress(IdentifiedError, FileNotFoundError):
-            response = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate
-            if flight.errors.response_speed != 1.0:
-                response = response.quicker(flight.errors.response_speed)
+        with suppress(PlantError, FileNotFoundError):
+            response = told_response(flight)
     at_once = PLANTS[flight.plant].at_once
     return Context(flight.guidance_period, flight.start.airspeed, flight.seed, response, at_once)
+
+
+def told_response(flight: Flight) -> "Response":
+    """The response of the heading rate to its command, as law and rules are told it: identified, with its error.
+
+    Raises `IdentifiedError` where it is not known, FileNotFoundError for an unknown airframe.
+    """
+    from harness.plants.identified import identified  # late: most laws need none
+
+    response = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate
+    speed = flight.errors.response_speed
+    return response if speed == 1.0 else response.quicker(speed)
 
 
 def air_of(flight: Flight) -> Air:

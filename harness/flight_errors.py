@@ -27,7 +27,10 @@ class Errors:
         1.0
     )
     response_speed: Annotated[
-        float, Ge(0.01), Le(100), About("the response that the law is told is quicker than the identified one by this")
+        float,
+        Ge(0.01),
+        Le(100),
+        About("how many times as quick as identified law and gains by rule take the response to be"),
     ] = 1.0
     command_delay: Annotated[
         Seconds,
@@ -48,8 +51,7 @@ class Errors:
     @property
     def of_loop(self) -> list[str]:
         """The names of the errors that are there and change how the aircraft answers a command."""
-        late = [name for name in ("command_delay", "response_speed") if getattr(self, name) != _NONE[name]]
-        return [*late, *self.of_aircraft]
+        return [*(["command_delay"] if self.command_delay else []), *self.of_aircraft]
 
     @property
     def of_aircraft(self) -> list[str]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import jsbsim
 import numpy as np
@@ -15,7 +16,7 @@ from autopilot.laws import law
 from harness.feasibility import warnings
 from harness.flight import Flight
 from harness.flight_errors import Errors
-from harness.limit_cycle.predicted import why_unknown
+from harness.limit_cycle.predicted import predicted_margin, why_unknown
 from harness.log import FlightLog
 from harness.loop import simulate
 from harness.plants.identified import identified
@@ -25,7 +26,8 @@ from harness.plants.sixdof import Trim, engage, load, si, trim, write
 from harness.settings import SettingsError, flight_from_document
 from harness.world.air import Air
 from harness.world.wind import Wind
-from tests.builders import FLIGHT, SIXDOF, OwnLaw, turning
+from tests.builders import FLIGHT, SIXDOF, OwnLaw, invoke, turning
+from tests.builders import write as file_of
 
 STICK = aircraft.folder("ultra_stick_25e")
 PERIOD = FLIGHT.guidance_period
@@ -249,7 +251,36 @@ def test_an_aircraft_too_heavy_to_fly_is_refused() -> None:
         simulate(replace(SIXDOF, errors=Errors(mass_scale=2.0)))
 
 
-@pytest.mark.parametrize("errors", [Errors(command_delay=0.1), Errors(mass_scale=1.1), Errors(response_speed=2.0)])
+def test_gains_by_rule_follow_from_the_response_that_is_told() -> None:
+    """Half of the border of a loop taken to be twice as quick is about the true border."""
+    law = {"name": "nftsm", "gains": "behind_inner_loop"}
+    k2, margin = [], []
+    for speed in (1.0, 2.0):
+        flight = flight_from_document({"plant": "sixdof", "law": law, "errors": {"response_speed": speed}})
+        k2.append(getattr(flight.law, "k2"))  # noqa: B009 - of this law alone
+        margin.append(predicted_margin(flight) or 0.0)
+    assert k2[1] > 1.8 * k2[0]
+    assert margin[0] > 1.5
+    assert margin[1] < 1.1
+
+
+def test_seeds_differ_by_the_noise_of_the_course(tmp_path: Path) -> None:
+    text = '[flight]\nplant = "kinematic"\nduration_s = 1.0\nlaw.name = "smc"\n[matrix]\nseed = [0, 1]\n'
+    assert "the 2 seeds repeat the same flight" in invoke("run", file_of(tmp_path / "a.toml", text), "--dry-run").stderr
+    noisy = text.replace("[matrix]", "errors.course_noise_deg = 1.0\n[matrix]")
+    assert "repeat" not in invoke("run", file_of(tmp_path / "b.toml", noisy), "--dry-run").stderr
+
+
+def test_each_aircraft_of_a_matrix_is_tried_before_it_flies(tmp_path: Path) -> None:
+    text = (
+        '[flight]\nplant = "sixdof"\nduration_s = 1.0\nlaw.name = "smc"\n[matrix]\n"errors.mass_scale" = [1.0, 2.0]\n'
+    )
+    told = invoke("run", file_of(tmp_path / "a.toml", text), "--dry-run")
+    assert told.exit_code == 2
+    assert "no level trim at 13 m/s" in told.stderr
+
+
+@pytest.mark.parametrize("errors", [Errors(command_delay=0.1), Errors(mass_scale=1.1), Errors(actuator_lag=0.1)])
 def test_of_a_loop_that_an_error_changes_nothing_is_predicted(errors: Errors) -> None:
     assert why_unknown(replace(SIXDOF, errors=errors)).startswith("the prediction does not know of errors.")
     assert why_unknown(replace(SIXDOF, errors=Errors(wind=1.0))) == ""

@@ -63,8 +63,8 @@ def print_survey(matrix: Matrix, size: Survey, done: int) -> None:
         click.echo(f"warning: and {counted(more, 'more warning')}", err=True)
     if size.idle_seeds and not done:
         click.echo(
-            f"warning: the {size.idle_seeds} seeds repeat the same flight: the target is known exactly, the air has "
-            "no turbulence, and no setting is drawn from the seed",
+            f"warning: the {size.idle_seeds} seeds repeat the same flight: target and course are known exactly, "
+            "the air has no turbulence, and no setting is drawn from the seed",
             err=True,
         )
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import aircraft
+from autopilot.guidance import uses_response
 from harness.error import HarnessError
 from harness.flight import Flight
 from harness.limit_cycle.margin import Following, following, margin_of
@@ -53,7 +54,8 @@ def why_unknown(flight: Flight) -> str:
 
 def _why_not(flight: Flight) -> str:
     """What keeps from asking for a prediction; empty when nothing does."""
-    if changed := flight.errors.of_loop:
+    misled = flight.errors.response_speed != 1.0 and uses_response(flight.law)
+    if changed := [*flight.errors.of_loop, *(["response_speed"] if misled else [])]:
         return f"the prediction does not know of errors.{changed[0]}"
     if not PLANTS[flight.plant].has_airframe:
         return f"the plant {flight.plant} has no airframe"

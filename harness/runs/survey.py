@@ -135,8 +135,10 @@ class _Seen:
 
 
 def _flight_survey(flight: Flight) -> _FlightSurvey:
-    random = flight.estimator.filters or flight.wind.turbulence != "none"
-    start = (flight.plant, flight.aircraft, flight.step, flight.start.airspeed, flight.start.altitude)
+    errors = flight.errors
+    random = flight.estimator.filters or flight.wind.turbulence != "none" or errors.course_noise > 0.0
+    body = (flight.aircraft, errors.mass_scale, errors.cg_aft, errors.actuator_lag)
+    start = (flight.plant, *body, flight.step, flight.start.airspeed, flight.start.altitude)
     return _FlightSurvey(
         tuple(warnings(flight)), random, flight.plant, typical_wall_time(flight), flight.periods, start
     )

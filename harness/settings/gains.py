@@ -6,11 +6,11 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-import aircraft
 from autopilot.guidance import Law
 from autopilot.laws import LAWS
 from autopilot.rules import Known, Rule, RuleError
-from harness.flight import Flight
+from harness.flight import Flight, told_response
+from harness.plants.plant import PlantError
 
 if TYPE_CHECKING:
     from autopilot.response import Response
@@ -25,11 +25,9 @@ def by_rule(flight: Flight, given: Collection[str]) -> Flight:
     kind = next((kind for kind in LAWS.values() if kind.value is type(law)), None)
     if kind is None or law.gains not in kind.rules or set(kind.numbers(law.gains)) <= set(given):
         return flight
-    from harness.plants.identified import IdentifiedError, identified  # late: few files name a rule
-
     try:
-        response, why_unknown = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate, ""
-    except (IdentifiedError, FileNotFoundError) as error:
+        response, why_unknown = told_response(flight), ""
+    except (PlantError, FileNotFoundError) as error:
         response, why_unknown = None, str(error)
     gains = _gains(kind.rules[law.gains], law, flight.start.airspeed, flight.guidance_period, response, why_unknown)
     return replace(flight, law=replace(law, **{name: value for name, value in gains.items() if name not in given}))
