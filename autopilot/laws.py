@@ -63,12 +63,16 @@ def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
     """
     if name not in LAWS:
         raise ValueError(_unknown("law", name, LAWS))
-    kind = LAWS[name]
+    return made(name, LAWS[name], gains, **parameters)
+
+
+def made(name: str, kind: LawKind, gains: str | None, **parameters: float | str) -> Law:
+    """The same of any law; one without gain sets has its own defaults."""
     gains = kind.default if gains is None else gains
     if gains in kind.former_names:
         warnings.warn(renamed(gains, kind.former_names[gains]), FutureWarning, stacklevel=2)
         gains = kind.former_names[gains]
-    if gains not in kind.sets:
+    if kind.sets and gains not in kind.sets:
         raise ValueError(_unknown(f"gain set of {name}", gains, kind.sets))
     known = [parameter for parameter in signature(kind.value).parameters if parameter != "gains"]
     if gains in kind.rules:
@@ -76,7 +80,8 @@ def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
     for parameter in parameters:
         if parameter not in known:
             raise ValueError(_unknown(f"parameter of {name}", parameter, known))
-    return kind.value(**{"gains": gains, **kind.numbers(gains), **parameters})
+    named = {"gains": gains} if gains and "gains" in signature(kind.value).parameters else {}
+    return kind.value(**{**named, **kind.numbers(gains), **parameters})
 
 
 def _unknown(what: str, name: str, known: Collection[str]) -> str:

@@ -11,6 +11,7 @@ from harness.margins import Assess
 from harness.runs.comparable import Comparable, comparable
 from harness.runs.results import as_results
 from harness.settings.columns import DIRECTORY
+from harness.settings.laws import short_names
 from harness.toml_text import shown
 from harness.verdict.comparison import Comparison, compare_flights
 from harness.verdict.pairs import CompareError, settings_of, usual
@@ -83,6 +84,9 @@ def chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
         if column.map(lambda value: isinstance(value, tuple)).any() and not any(isinstance(v, tuple) for v in values):
             values = [tuple(values)]  # a setting that is a list itself
         there = list(dict.fromkeys(column))
+        if key == "law.name":
+            full = {name: own for own, name in short_names(there).items()}
+            values = [full.get(str(value), value) for value in values]
         for value in values:
             if value not in there:
                 known = ", ".join(map(str, there[:20])) + (", ..." if len(there) > 20 else "")

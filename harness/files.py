@@ -1,5 +1,6 @@
-"""Writing a file completely or not at all, and names of files as text."""
+"""Writing a file completely or not at all, names of files as text, and the hash of a content."""
 
+import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -51,3 +52,8 @@ def as_text(text: str) -> str:
 def is_text(path: Path) -> bool:
     """Whether the name is Unicode, as far as the locale tells."""
     return as_text(str(path)) == str(path)
+
+
+def content_hash(content: bytes) -> str:
+    """A hash, 32 hex digits, of the content of a file."""
+    return hashlib.blake2b(content, digest_size=16).hexdigest()

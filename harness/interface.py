@@ -17,6 +17,7 @@ from harness.flight import Flight
 from harness.log import FlightLog
 from harness.settings import document, flight_from_document
 from harness.settings.gains import by_rule
+from harness.settings.laws import absolute, is_own, kind_of, kind_of_class
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,8 @@ def law(name: str, gains: str | None = None, *, flight: Flight | None = None, **
 
     `parameters` override single gains and what all laws have: `standoff` (m), `max_heading_rate` (rad/s, not degrees),
     `direction`, `airspeed`, `command`. `harness list laws` shows all of them. A gain set that follows from a rule needs
-    the `flight` for whose circle, airspeed, period and airframe it is calculated.
+    the `flight` for whose circle, airspeed, period and airframe it is calculated. A law of your own is named by its
+    file, "FILE.py:CLASS" from the working folder, or as "MODULE:CLASS".
 
     Raises `ArgumentError` for a law, a gain set or a parameter that there is not, with those that there are;
     and for a rule that has no answer; FutureWarning for the former name of a gain set.
@@ -40,12 +42,15 @@ def law(name: str, gains: str | None = None, *, flight: Flight | None = None, **
     >>> harness.law("nftsm")
     >>> harness.law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
     >>> harness.law("nftsm", "behind_inner_loop", flight=flight)
+    >>> harness.law("my_law.py:MyLaw", lean=0.02)
     """
-    kind = laws.LAWS.get(name)
     try:
-        if kind is None or gains is None or gains not in kind.rules or flight is None:
-            return laws.law(name, gains, **parameters)
-        base: Any = laws.law(name, kind.rules[gains].base, **parameters)
+        if not is_own(name) and name not in laws.LAWS:
+            return laws.law(name)
+        kind = kind_of(absolute(name, Path()), run=True)
+        if gains is None or gains not in kind.rules or flight is None:
+            return laws.made(name, kind, gains, **parameters)
+        base: Any = laws.made(name, kind, kind.rules[gains].base, **parameters)
         return by_rule(replace(flight, law=replace(base, gains=gains)), parameters).law
     except ValueError as error:
         raise ArgumentError(str(error)) from None
@@ -239,6 +244,6 @@ def _checked(flight: Flight) -> Flight:
     if target.track is not None:
         target = replace(target, track=str(target.track))
     flight = replace(flight, aircraft=str(flight.aircraft), target=target)
-    is_own = type(flight.law) not in [kind.value for kind in laws.LAWS.values()]  # a law of one's own checks itself
-    flight_from_document(document(replace(flight, law=laws.law("nftsm")) if is_own else flight))
+    has_name = kind_of_class(type(flight.law)) is not None  # a law of one's own without a name checks itself
+    flight_from_document(document(flight if has_name else replace(flight, law=laws.law("nftsm"))))
     return flight

@@ -12,9 +12,11 @@ import aircraft
 import autopilot
 from autopilot.estimator import ESTIMATORS
 from autopilot.guidance import uses_response
+from harness.files import content_hash
 from harness.flight import Flight
 from harness.plants.ladder import PLANTS, identification_files
 from harness.settings import document
+from harness.settings.laws import source_of
 
 PHYSICS_VERSION = 3  # of plants, wind and loop: raised whenever a change there moves a trajectory
 METRICS_VERSION = 6  # of the metrics: raised whenever a change moves the value of one
@@ -41,6 +43,8 @@ def identity(flight: Flight) -> Identity:
     hashed_settings = dict(settings)  # of a file or a folder its content counts, not its path
     if settings["target"]["track"] is not None:
         hashed_settings["target"] = {**settings["target"], "track": "content"}
+    if own := source_of(flight.law):
+        hashed_settings["law"] = {**settings["law"], "name": f"{own.main.name}:{own.class_name}"}
     if flight.aircraft not in aircraft.names():
         hashed_settings["aircraft"] = _of_folder(flight.aircraft)
     return Identity(hashed({"settings": hashed_settings, "version": version.number}), settings, version)
@@ -62,7 +66,8 @@ def version_of(flight: Flight) -> Version:
         "turbulence": ("numpy", "scipy") if flight.wind.turbulence != "none" else (),
         "estimator": ESTIMATORS[flight.estimator.kind].libraries,
     }
-    content = {**_ON_BOARD, **_hashes(_read(flight))}
+    own = source_of(flight.law)
+    content = {**_ON_BOARD, **(own.hashes if own else {}), **_hashes(_read(flight))}
     return _version(PHYSICS_VERSION, METRICS_VERSION, tuple(content.items()), tuple(libraries.items()))
 
 
@@ -73,7 +78,8 @@ def flight_key(flight: Flight) -> str:
 
 def files(flight: Flight) -> dict[str, Path]:
     """The path of every file whose content decides the flight, by a name for its purpose, such as `target/track`."""
-    return {**_PYTHON, **_read(flight)}
+    own = source_of(flight.law)
+    return {**_PYTHON, **(own.files if own else {}), **_read(flight)}
 
 
 def _read(flight: Flight) -> dict[str, Path]:
@@ -108,11 +114,6 @@ def hashed(content: object) -> str:
     """A hash, 32 hex digits, of a value that JSON can hold; the order of keys does not matter."""
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
-
-
-def content_hash(content: bytes) -> str:
-    """A hash, 32 hex digits, of the content of a file."""
-    return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
 def _hashes(files: Mapping[str, Path]) -> dict[str, str]:

@@ -1,12 +1,12 @@
 """The one loop: target, sensor and estimator, observation, guidance law, plant."""
 
 import math
+import struct
 from collections.abc import Callable, Sequence
-from struct import Struct
 
 import numpy as np
 
-from autopilot.guidance import Context, Guidance, LawStep, Observation, started
+from autopilot.guidance import Context, Guidance, Law, LawStep, Observation, started
 from harness.checks import problems
 from harness.feasibility import margins_in_flight
 from harness.flight import Flight, air_of, context_of, plant_of
@@ -41,7 +41,7 @@ def simulate(
     target = flight.target.start()
     estimation = Estimation(flight, target) if flight.estimator.filters else None
     estimator = estimation.at if estimation else perfect_estimator(flight.estimator)
-    law = started(flight.law, context or context_of(flight))
+    known = context or context_of(flight)
     flying = (plant or plant_of(flight)).start(flight.start, air_of(flight))
     if flight.errors.command_delay:
         whole, steps = divmod(round(flight.errors.command_delay / flight.step), round(period / flight.step))
@@ -55,6 +55,7 @@ def simulate(
         return completed(log, estimation.rows[:rows] if estimation else None)
 
     try:
+        law = begun(flight.law, known)
         for k in range(last + 1):
             time = k * period
             state, truth = flying.state, target(time)
@@ -73,6 +74,8 @@ def simulate(
                 flying.advance(guidance.heading_rate, period)
     except End as end:
         outcome, reason = end.outcome, str(end)
+    except struct.error as error:
+        outcome, reason = Outcome.INVALID, f"the law answered what is no number: {error}"
     return log_so_far()
 
 
@@ -90,13 +93,22 @@ def observe(
     return Observation._make((*state[:_OWN], nominal_airspeed, *wind, *estimate, time))
 
 
+def begun(law: Law, context: Context) -> LawStep:
+    """The law in flight. Raises `End` when it cannot start."""
+    try:
+        return started(law, context)
+    except Exception as error:
+        raise End(Outcome.INVALID, f"the law cannot start: {type(error).__name__}: {error}") from error
+
+
 def command(law: LawStep, observation: Observation) -> Guidance:
     """The law's answer. Raises `End` when the law fails or its command is not finite: an outcome of the flight."""
     try:
         guidance = law(observation)
+        is_finite = math.isfinite(guidance.heading_rate)
     except Exception as error:
         raise End(Outcome.INVALID, f"the law raised {type(error).__name__}: {error}") from error
-    if not math.isfinite(guidance.heading_rate):
+    if not is_finite:
         raise End(Outcome.INVALID, f"the law commanded {guidance.heading_rate}")
     return guidance
 
@@ -120,4 +132,4 @@ def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | None) -> 
 
 
 _ROW_BYTES = 8 * len(COLUMNS)
-_write_row = Struct(f"{len(LOOP_COLUMNS)}d").pack_into  # the fastest way to put a row of floats into the table
+_write_row = struct.Struct(f"{len(LOOP_COLUMNS)}d").pack_into  # the fastest way to put a row of floats into the table

@@ -9,17 +9,24 @@ import click
 
 def _laws() -> Iterator[str]:
     from autopilot.laws import LAWS
+    from harness.settings.laws import LawError, entries, kind_of
     from harness.tables import number, table
 
-    for i, (name, law) in enumerate(LAWS.items()):
+    for i, name in enumerate([*LAWS, *entries()]):
         yield from [""] * bool(i)
+        try:
+            law = kind_of(name, run=True)
+        except LawError as error:
+            yield f"{name}: {error}"
+            continue
         yield f"{name}: {(law.value.__doc__ or '').splitlines()[0]}"
         gains = list(dict.fromkeys(key for values in law.gain_sets.values() for key in values))
         rows = (
             [f"{chosen} (default)" if chosen == law.default else chosen, *(number(values.get(key)) for key in gains)]
             for chosen, values in law.gain_sets.items()
         )
-        yield from table(["gain set", *gains], rows, "lr")
+        if gains:
+            yield from table(["gain set", *gains], rows, "lr")
         if law.rules:
             yield ""
             by_rule = ([name, rule.base, rule.about] for name, rule in law.rules.items())

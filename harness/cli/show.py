@@ -50,6 +50,7 @@ def show(
     from harness.runs.recall import other_versions, row_address
     from harness.runs.results import load_results
     from harness.runs.store import StoreError, find
+    from harness.settings.laws import short_names
     from harness.verdict.pairs import CompareError, varying
 
     address = row_address(row)
@@ -75,6 +76,7 @@ def show(
         return
     marked = chosen["version"].isin([number[:8] for number in others])
     chosen = chosen.assign(key=chosen["key"].str[:8].where(~marked, chosen["key"].str[:8] + _MARK))
+    chosen = chosen.assign(**{"law.name": chosen["law.name"].map(short_names(chosen["law.name"]))})
     for line in _table(chosen, named or _usual(flights), limit or _MOST_LINES):
         click.echo(line)
     if changed := dict.fromkeys(what for names in others.values() for what in names):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from harness.margins import Assess
+from harness.runs.recall import load_laws
 from harness.runs.results import load_results, versions
 from harness.runs.store import StoreError, last_run
 from harness.settings import settings_from_text
@@ -33,6 +34,8 @@ def comparable(folders: Sequence[Path], by: str | None = None, overrides: Sequen
     import pandas as pd
 
     question, assess = _asked(folders[0], overrides)
+    for folder in folders:
+        load_laws(folder)
     if len(folders) == 1:
         _refuse_mixed(versions(folders[0]), str(folders[0]))
         return Comparable(load_results(folders[0]), assess, question)

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from autopilot.laws import LAWS
 from harness.log.metric import METRICS, Value, window_in_words
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
@@ -14,6 +13,7 @@ from harness.runs.recordings import recording_path
 from harness.runs.store import Stored
 from harness.settings import document, flight_from_document
 from harness.settings.columns import by_column
+from harness.settings.laws import is_own, loaded_kind, short
 from harness.tables import number, table
 
 
@@ -68,9 +68,11 @@ def flown(settings: Mapping[str, Any]) -> str:
     law, plant = settings["law"], settings["plant"]
     airframe = f" {settings['aircraft']}" if PLANTS[plant].has_airframe else ""
     single = "".join(f", {gain} = {value:g}" for gain, value in _single_gains(law).items())
-    by_rule = "by the rule " if law["gains"] in LAWS[law["name"]].rules else ""
+    kind, gains = loaded_kind(law["name"]), law.get("gains")
+    by_rule = "by the rule " if kind and gains in kind.rules else ""
+    with_gains = f" with gains {by_rule}{gains}" if gains else ""
     return (
-        f"law {law['name']} with gains {by_rule}{law['gains']}{single}, on plant {plant}{airframe}, for "
+        f"law {short(law['name'])}{with_gains}{single}, on plant {plant}{airframe}, for "
         f"{settings['duration_s']:g} s in {_air(settings['wind'])}, seed {settings['seed']}"
     )
 
@@ -105,7 +107,8 @@ def _difference(value: Value, earlier: Value) -> str:
 
 def _single_gains(law: Mapping[str, Any]) -> dict[str, float]:
     """The gains that are not those of the named set; of a rule those that it gave."""
-    named = LAWS[law["name"]].numbers(law["gains"])
+    kind = loaded_kind(law["name"])
+    named = kind.numbers(law["gains"]) if kind and "gains" in law else {}
     return {gain: law[gain] for gain, value in named.items() if law[gain] != value}
 
 
@@ -124,8 +127,12 @@ def _circle(row: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
 
 def _own_settings(settings: Mapping[str, Any], varying: Collection[str]) -> dict[str, object]:
     """Plant, law, the settings `varying`, and every one whose value is not the default of plant and law, by its key."""
-    chosen = {"plant": settings["plant"], "law": {"name": settings["law"]["name"]}}
-    default = by_column(document(flight_from_document(chosen)))
+    name = settings["law"]["name"]
+    chosen = {"plant": settings["plant"], "law": {"name": "nftsm" if is_own(name) else name}}
+    default = document(flight_from_document(chosen))
+    if is_own(name):  # its code is not run to know its defaults
+        default["law"] = {}
+    default = by_column(default)
     return {
         key: value
         for key, value in by_column(settings).items()

@@ -12,6 +12,7 @@ from harness.runs.recordings import recording_path
 from harness.runs.store import find, on_each_plant
 from harness.settings import SettingsError, document, flight_from_document
 from harness.settings.columns import by_column
+from harness.settings.laws import short
 
 Say = Callable[[str], None]
 _MOST_WORDS = 3  # in the name of a flight
@@ -81,5 +82,6 @@ def distinctly_named(logs: Sequence[FlightLog]) -> dict[str, FlightLog]:
 def _word(key: str, settings: Mapping[str, object]) -> str:
     value = settings[key]
     text = f"{value:g}" if isinstance(value, float) else str(value)
+    text = short(text) if key == "law.name" else text
     plain = key in ("plant", "aircraft", "law.name", "law.gains", "wind.turbulence", "estimator.kind")
     return text if plain else f"{key.rpartition('.')[2]}={text}"

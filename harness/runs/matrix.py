@@ -139,7 +139,7 @@ class Matrix:
         With `started` the error also says whether the flight could start, were it not for its other mistakes.
         """
         try:
-            return flight_from_document(self._document(combination)["flight"], self.file.path.parent)
+            return flight_from_document(self._document(combination)["flight"], self.file.path.parent, run=True)
         except SettingsError:
             return self.located(combination).flight(started=started)  # raises the same, with its place
 

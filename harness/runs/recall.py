@@ -1,21 +1,25 @@
 """Flying a stored row again, also when the files that it was flown with have changed or are gone."""
 
 import atexit
+import json
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import aircraft
+from harness.files import content_hash
 from harness.flight import Flight
-from harness.key import content_hash, version_of
+from harness.key import version_of
 from harness.log import FlightLog
 from harness.loop import simulate
 from harness.runs.row import FlightResult, result_of
 from harness.runs.store import Stored, StoreError, content, examples, find, reading
 from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
+from harness.settings.laws import FILES, is_unchanged
 
 
 class RowAddress(NamedTuple):
@@ -70,10 +74,24 @@ def recall(place: RowAddress) -> Recalled:
         case {"aircraft": str(name)}:
             settings["aircraft"] = _airframe(place.folder, name, then)
     try:
+        is_unchanged(settings, then)
         flight = flight_from_document(settings)
     except SettingsError as error:
         raise StoreError(f"{place.folder}: the flight {stored.row['key']} cannot be flown again: {error}") from None
     return Recalled(stored, settings, flight, tuple(_changed(stored.version, version_of(flight).decides)))
+
+
+def load_laws(folder: Path) -> None:
+    """Loads the laws of one's own that the rows name, but for those that have changed or are gone. `StoreError`."""
+    with reading(folder) as journal:
+        rows = journal.execute(
+            "SELECT DISTINCT json_extract(f.settings, '$.law.name'), v.decides FROM flights f "
+            "JOIN versions v ON v.id = f.version WHERE v.decides LIKE ?",
+            (f'%"{FILES}%',),
+        ).fetchall()
+        for name, decides in rows:
+            with suppress(SettingsError):
+                is_unchanged({"law": {"name": name}}, json.loads(decides)["content"])
 
 
 def other_versions(folder: Path) -> dict[str, list[str]]:
@@ -85,6 +103,7 @@ def other_versions(folder: Path) -> dict[str, list[str]]:
     with reading(folder) as journal:
         for number, decides, settings in examples(journal):
             try:
+                is_unchanged(settings, decides["content"])
                 now = version_of(flight_from_document(without_former_names(settings))).decides
             except (SettingsError, OSError) as error:
                 others[number] = [str(error)]

@@ -17,6 +17,7 @@ from harness.runs.store import JOURNAL, Store, examples, positions, reading
 from harness.runs.wall_time import TimeLeft, WallTime
 from harness.runs.workers import TIMEOUT, Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document
+from harness.settings.laws import is_unchanged
 
 RECORDED = 50  # flights: a run of at most so many records all of them, a larger run a sample of this size
 LOGS = ("all", "sample", "failed", "none")
@@ -194,8 +195,9 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> Mappi
         return {}
     with reading(folder) as journal:
         current = []
-        for version, _, settings in examples(journal):
+        for version, decides, settings in examples(journal):
             try:
+                is_unchanged(settings, decides["content"])
                 now = version_of(flight_from_document(settings))
             except (SettingsError, OSError):
                 continue  # its files are gone

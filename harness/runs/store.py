@@ -13,8 +13,8 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from harness.error import HarnessError
-from harness.files import as_text, make_folder
-from harness.key import Version, content_hash
+from harness.files import as_text, content_hash, make_folder
+from harness.key import Version
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
 from harness.runs.row import FlightResult, FlightRow

@@ -12,6 +12,7 @@ from harness.plants.plant import Outcome
 from harness.runs.matrix import Matrix
 from harness.runs.store import reading
 from harness.settings.columns import by_column
+from harness.settings.laws import is_own, short_names
 
 
 class Line(NamedTuple):
@@ -67,7 +68,9 @@ def summary(matrix: Matrix, folder: Path, most: int) -> Summary:
                 left_out.add(labels)
             else:
                 groups.setdefault(labels, _Group()).add(outcome, json.loads(metrics))
-    return Summary(axes, [group.line(labels) for labels, group in groups.items()], len(left_out), failures)
+    laws = short_names(label for labels in groups for label in labels if is_own(label))
+    lines = [group.line(tuple(laws.get(label, label) for label in labels)) for labels, group in groups.items()]
+    return Summary(axes, lines, len(left_out), failures)
 
 
 class _Group:

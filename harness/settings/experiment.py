@@ -5,14 +5,20 @@ its values come from a named gain set.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Annotated, Literal
 
+from pydantic_core import PydanticCustomError
+
+from autopilot.guidance import Law
 from autopilot.laws import LAWS
 from autopilot.quantities import About
+from autopilot.standoff import StandoffLaw
 from harness.flight import Flight
 from harness.margins import Assess
+from harness.settings.laws import kind_of_class
+from harness.settings.mistake import REFUSED
 from harness.settings.table import Setting, TableSchema, schema_of
 
 CUSTOM = "custom"  # instead of a named gain set: every gain is given
@@ -34,11 +40,19 @@ class Experiment:
 
 
 @cache
-def document_table(law: str | None, gains_given: bool) -> TableSchema:
-    """The schema of a whole file, which builds its flight. `law` is the law's name, None while it is unknown."""
-    table = schema_of(Experiment)
-    flight = Setting(Flight, "flight", table=flight_table(law_table(law, gains_given)))
-    return TableSchema({**table.settings, "flight": flight}, lambda flight, **others: flight)
+def document_table(law: type[Law] | None, gains_given: bool) -> TableSchema:
+    """The schema of a whole file, which builds its flight. `law` is the law's class, None while it is unknown."""
+    return _document(law_table(law, gains_given))
+
+
+def without_law() -> TableSchema:
+    """The schema of a whole file of which the law is told to be wrong already."""
+    return _document(TableSchema({}, lambda **given: None, open=True))
+
+
+def _document(law: TableSchema) -> TableSchema:
+    flight = Setting(Flight, "flight", table=flight_table(law))
+    return TableSchema({**schema_of(Experiment).settings, "flight": flight}, lambda flight, **others: flight)
 
 
 def flight_table(law: TableSchema) -> TableSchema:
@@ -47,20 +61,40 @@ def flight_table(law: TableSchema) -> TableSchema:
     return TableSchema({**table.settings, "law": replace(table.settings["law"], table=law)}, table.make)
 
 
-def law_table(name: str | None, gains_given: bool) -> TableSchema:
-    """The schema of [flight.law]; with `gains_given` it asks for every gain. Without a `name`: that of all laws."""
+def law_table(law: type[Law] | None, gains_given: bool) -> TableSchema:
+    """The schema of [flight.law]; with `gains_given` it asks for every gain. Without a `law`: that of all laws."""
     named = {"name": Setting(Literal[*LAWS], "name")}
-    if name is None:
+    known = kind_of_class(law) if law else None
+    if known is None:
         keys = {
             key: replace(s, required=False) for law in LAWS.values() for key, s in schema_of(law.value).settings.items()
         }
         every = dict.fromkeys(gains for law in LAWS.values() for gains in (*law.sets, CUSTOM))
         return TableSchema({**keys, **named, "gains": Setting(Literal[*every], "gains", required=False)}, dict)
-    kind = LAWS[name]
-    value = kind.value
+    name, kind = known
+    value, sets = kind.value, kind.sets
+    own = schema_of(value).settings
+    parameters = {setting.name for setting in own.values()}
+    of_sets = set.intersection(*map(set, kind.gain_sets.values())) if kind.gain_sets and not gains_given else set()
 
     def make(name: str, gains: str = kind.default, **given: float | str) -> object:
-        return value(**{"gains": gains, **kind.numbers(gains), **given})
+        given = {**({"gains": gains} if gains else {}), **kind.numbers(gains), **given}
+        try:
+            return value(**{key: number for key, number in given.items() if key in parameters})
+        except Exception as error:  # a law of one's own may check itself
+            raise PydanticCustomError(REFUSED, "{why}", {"why": str(error)}) from None
 
-    own = {key: replace(s, required=s.required and gains_given) for key, s in schema_of(value).settings.items()}
-    return TableSchema({**named, **own, "gains": Setting(Literal[*kind.sets, CUSTOM], "gains", required=False)}, make)
+    keys = {key: replace(s, required=s.required and s.name not in of_sets) for key, s in own.items()}
+    if name not in LAWS:
+        named = {"name": Setting(str, "name"), **_left_out(value, own)}
+    if sets or "gains" not in own:
+        keys["gains"] = Setting(Literal[*sets, CUSTOM], "gains", required=False)
+    return TableSchema({**named, **keys}, make)
+
+
+def _left_out(law: type[Law], own: Mapping[str, Setting]) -> dict[str, Setting]:
+    """The keys that all laws of the package have and this one lacks: a file may say of them what is so anyway."""
+    said = {f.name: (getattr(law, f.name, None), f.default) for f in fields(StandoffLaw)}
+    so = {name: own if isinstance(own, str) else default for name, (own, default) in said.items()}
+    shared = schema_of(StandoffLaw).settings
+    return {key: Setting(Literal[so[s.name]], s.name, required=False) for key, s in shared.items() if key not in own}

@@ -19,10 +19,11 @@ from harness.files import file_name
 from harness.flight import Flight
 from harness.margins import Assess
 from harness.settings.check import Checked, check, checked
-from harness.settings.experiment import CUSTOM, Experiment, document_table
+from harness.settings.experiment import CUSTOM, Experiment, document_table, without_law
 from harness.settings.former_names import without_former_names
 from harness.settings.gains import by_rule
 from harness.settings.keys import file_key, put
+from harness.settings.laws import LawError, absolute, is_own, kind_of
 from harness.settings.mended import concerns, mended
 from harness.settings.mistake import Mistake, Place, Places, settings_error
 from harness.settings.speed import at_own_speed
@@ -48,7 +49,7 @@ class SettingsFile:
             raise SettingsError(
                 [f"{self._place(('matrix',)).text}: matrix: is many flights, must be one: use `harness run`"]
             )
-        return _flight(self.document, self._place, self.path.parent, started=started)
+        return _flight(self.document, self._place, self.path.parent, started=started, run=True)
 
     def experiment(self) -> Experiment:
         """Everything in the file; the content of [flight] and of [matrix] stays unchecked. Raises `SettingsError`."""
@@ -163,12 +164,13 @@ def overridden(file: SettingsFile, overrides: Sequence[str], option: str = "--se
     return replace(changed, document=without_former_names(document, changed.warn))
 
 
-def flight_from_document(document: Mapping[str, object], folder: Path = Path()) -> Flight:
+def flight_from_document(document: Mapping[str, object], folder: Path = Path(), *, run: bool = False) -> Flight:
     """The flight of a [flight] table in file units; relative paths of a track or an airframe start at `folder`.
 
-    Raises `SettingsError`, whose lines name the key but no file.
+    With `run` the table is the user's own: the file of a law that it names may be run. Without, that law was loaded
+    before, or is refused. Raises `SettingsError`, whose lines name the key but no file.
     """
-    return _flight({"flight": without_former_names(document)}, lambda key: Place(0, ""), folder)
+    return _flight({"flight": without_former_names(document)}, lambda key: Place(0, ""), folder, run=run)
 
 
 def _text(path: Path) -> str:
@@ -181,15 +183,15 @@ def _text(path: Path) -> str:
         raise SettingsError([f"{path}:{line}: not text in UTF-8"]) from None
 
 
-def _flight(document: Mapping[str, object], place: Places, folder: Path, *, started: bool = False) -> Flight:
+def _flight(document: Mapping[str, object], place: Places, folder: Path, *, started: bool = False, run: bool) -> Flight:
     """The flight of a document, completely checked; relative paths of a track or an airframe start at `folder`.
 
     With `started` it is tried whether it can start. Raises `SettingsError`.
     """
-    value, found = _described(document, folder)
+    value, found = _described(document, folder, run=run)
     wrong = [mistake.key for mistake in found]
     if wrong:
-        value, _ = _described(mended(document, wrong), folder)
+        value, _ = _described(mended(document, wrong), folder, run=run)
     if not isinstance(value, Flight):
         raise settings_error(found, place)
     mistakes = [*found]
@@ -202,18 +204,30 @@ def _flight(document: Mapping[str, object], place: Places, folder: Path, *, star
     return value
 
 
-def _described(document: Mapping[str, object], folder: Path) -> Checked:
-    """The flight of a document, each of its values checked on its own; the paths of track and airframe are absolute."""
-    match document:
-        case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS:
-            table = document_table(name, law.get("gains") == CUSTOM)
-        case _:
-            table = document_table(None, False)
+def _described(document: Mapping[str, object], folder: Path, *, run: bool) -> Checked:
+    """The flight of a document, each of its values checked on its own; the paths of files in it are absolute."""
     given = document.get("flight")
+    if isinstance(given, Mapping):
+        given = _with_paths(given, folder)
+        document = {**document, "flight": given}
+    table, refused = _table(document, run=run)
     schema = table.settings["flight"].table
     if isinstance(given, Mapping) and schema is not None:
-        document = {**document, "flight": at_own_speed(_with_paths(given, folder), schema)}
+        document = {**document, "flight": at_own_speed(given, schema)}
+    if refused:
+        return Checked(None, [*refused, *check(table, document).mistakes])
     return _with_gains_by_rule(check(table, document), document)
+
+
+def _table(document: Mapping[str, object], *, run: bool) -> tuple[TableSchema, list[Mistake]]:
+    """The schema of a document with its law, and what is wrong with a law of one's own."""
+    match document:
+        case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS or is_own(name):
+            try:
+                return document_table(kind_of(name, run=run).value, law.get("gains") == CUSTOM), []
+            except LawError as error:
+                return without_law(), [Mistake(("flight", "law", "name"), str(error))]
+    return document_table(None, False), []
 
 
 def _with_gains_by_rule(described: Checked, document: Mapping[str, Any]) -> Checked:
@@ -233,15 +247,18 @@ def _with_gains_by_rule(described: Checked, document: Mapping[str, Any]) -> Chec
 def _with_paths(flight: Mapping[str, object], folder: Path) -> Mapping[str, object]:
     """A [flight] table whose paths are absolute."""
     flight = {key: _absolute(("flight", key), value, folder) for key, value in flight.items()}
-    if isinstance(target := flight.get("target"), Mapping):
-        flight["target"] = {k: _absolute(("flight", "target", k), value, folder) for k, value in target.items()}
+    for part in ("target", "law"):
+        if isinstance(table := flight.get(part), Mapping):
+            flight[part] = {k: _absolute(("flight", part, k), value, folder) for k, value in table.items()}
     return flight
 
 
 def _absolute(key: Key, value: object, folder: Path = Path()) -> object:
-    """The value of a key; the name of a track, or of an airframe that is a folder there, as a path from `folder`."""
+    """The value of a key; a file of a track or a law, or a folder of an airframe, as a path from `folder`."""
     if not isinstance(value, str) or not value:
         return value
+    if key == ("flight", "law", "name"):
+        return absolute(file_name(value), folder)
     path = str(folder.absolute() / file_name(value))
     if key == ("flight", "aircraft") and value not in aircraft.names() and aircraft.is_folder(path):
         return path

@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from autopilot.guidance import Law
-from autopilot.laws import LAWS
 from autopilot.rules import Known, Rule, RuleError
 from harness.flight import Flight, told_response
 from harness.plants.plant import PlantError
+from harness.settings.laws import kind_of_class
 
 if TYPE_CHECKING:
     from autopilot.response import Response
@@ -22,8 +22,8 @@ def by_rule(flight: Flight, given: Collection[str]) -> Flight:
     Raises `RuleError`, with the reason, where the rule has no answer.
     """
     law: Any = flight.law
-    kind = next((kind for kind in LAWS.values() if kind.value is type(law)), None)
-    if kind is None or law.gains not in kind.rules or set(kind.numbers(law.gains)) <= set(given):
+    kind = known[1] if (known := kind_of_class(type(law))) else None
+    if kind is None or not kind.rules or law.gains not in kind.rules or set(kind.numbers(law.gains)) <= set(given):
         return flight
     try:
         response, why_unknown = told_response(flight), ""

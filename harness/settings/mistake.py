@@ -13,6 +13,7 @@ from harness.settings.table import Setting, TableSchema
 from harness.settings.toml_locator import Key, dotted
 from harness.toml_text import shown
 
+REFUSED = "refused"  # the type of an error whose message says all
 LARGEST = 1e9  # in file units: the largest size of any number
 
 _NOUNS: Mapping[object, str] = {float: "number", int: "whole number", str: "string"}
@@ -65,6 +66,8 @@ def mistake(table: TableSchema, document: Any, details: ErrorDetails) -> Mistake
             return Mistake(key, f"is missing, must be {_expected(setting)}")
         value = value[step]
     assert setting
+    if details["type"] == REFUSED:
+        return Mistake(key, details["msg"])
     if value is TOLD:
         return Mistake(key, "")
     expected = _expected(replace(setting, length=None) if isinstance(key[-1], int) else setting)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Union, get_args, get_origin, get_type_hin
 from annotated_types import Ge, Gt, Le, Lt
 
 from autopilot.quantities import OneOf, Unit, Unlimited
+from autopilot.standoff import StandoffLaw
 from harness.settings.number import in_file
 
 _PLAIN = Unit("", 1.0)
@@ -41,9 +42,11 @@ class Setting:
 def _read(part: type) -> TableSchema:
     hints = get_type_hints(part, include_extras=True)
     settings = {}
+    shared = get_type_hints(StandoffLaw, include_extras=True)  # a law of one's own may write a plain `standoff: float`
     for f in fields(part):
         required = f.default is MISSING and f.default_factory is MISSING
-        setting = replace(_annotated(hints[f.name]), name=f.name, required=required)
+        hint = shared.get(f.name, float) if hints[f.name] is float else hints[f.name]
+        setting = replace(_annotated(hint), name=f.name, required=required)
         key = f"{f.name.rstrip('_')}_{setting.unit.suffix}".rstrip("_")
         settings[key] = setting
     return TableSchema(settings, part)

@@ -5,9 +5,9 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from autopilot.laws import LAWS
 from harness.error import SettingsError
 from harness.flight import Flight
+from harness.settings.laws import NotRun, kind_of_class
 from harness.settings.number import in_file
 from harness.settings.table import Setting, schema_of
 
@@ -17,11 +17,16 @@ def document(flight: Flight) -> dict[str, Any]:
 
     Raises `SettingsError` for a law without a name.
     """
-    name = next((name for name, kind in LAWS.items() if kind.value is type(flight.law)), None)
-    if name is None:
+    if isinstance(flight.law, NotRun):
+        return {**written(flight), "law": dict(flight.law.table)}
+    known = kind_of_class(type(flight.law))
+    if known is None:
         own = type(flight.law).__name__
-        raise SettingsError([f"flight.law: {own} has no name in autopilot/laws.py, by which a file could keep it"])
-    return {**written(flight), "law": {"name": name, **written(flight.law)}}
+        how = f'harness.law("FILE.py:{own}") gives it one'
+        raise SettingsError(
+            [f"flight.law: {own} has no name in autopilot/laws.py, by which a file could keep it; {how}"]
+        )
+    return {**written(flight), "law": {"name": known[0], **written(flight.law)}}
 
 
 def toml(flight: Flight) -> str:

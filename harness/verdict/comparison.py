@@ -10,6 +10,7 @@ import pandas as pd
 from harness.log.metric import METRICS
 from harness.margins import Assess
 from harness.plants.ladder import BASELINE
+from harness.settings.laws import short_names
 from harness.verdict.conditions import Conclusion, conclude
 from harness.verdict.following import with_following, with_margins
 from harness.verdict.judgement import Judgement, frame, judged
@@ -172,6 +173,9 @@ def compare_flights(
         baseline = BASELINE if by == "plant" else values[0]
     assumption = by == "plant" and shown(baseline) == BASELINE
     table = with_shares(entered((with_following if assumption else with_margins)(flights), assess.circling_error))
+    laws = short_names(table["law.name"])
+    table["law.name"] = table["law.name"].map(laws)
+    baseline = laws.get(str(baseline), baseline) if by == "law.name" else baseline
     paired = pairs_by(table, by, baseline)
     failed = table["outcome"].isin(FAILED)
     return Comparison(

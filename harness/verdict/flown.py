@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from autopilot.laws import LAWS
 from harness.log.metric import METRICS
+from harness.settings.laws import loaded_kind
 from harness.tables import number, table
 from harness.verdict.comparison import Comparison
 from harness.verdict.pairs import joined, ordered, shown, spread
@@ -40,8 +40,10 @@ class Flown(NamedTuple):
 
 def gains_by_rule(flights: pd.DataFrame) -> Iterator[str]:
     """Which rule gave which numbers, a sentence for each gain set that follows from a rule."""
+    if "law.gains" not in flights:
+        return
     for (name, gains), rows in flights.groupby(["law.name", "law.gains"], sort=False):
-        kind = LAWS.get(str(name))
+        kind = loaded_kind(str(name))
         if kind is None or gains not in kind.rules:
             continue
         base = kind.numbers(str(gains))

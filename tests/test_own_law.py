@@ -1,0 +1,248 @@
+"""A law of one's own, named by its file or module: flown, kept, and never run because somebody else's file names it."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+import harness
+from harness.key import files, flight_key
+from harness.plants.plant import Outcome
+from harness.settings import SettingsError, document, flight_from_document
+from harness.settings.laws import entries
+from tests.builders import EXPERIMENTS, fly_matrix, invoke, write
+
+PLAIN = '''
+from dataclasses import dataclass
+from math import atan, atan2, hypot, pi
+
+from autopilot.guidance import Context, Guidance, LawStep, Observation
+from leaning import lean
+
+open("was_run", "a").close()  # where the test looks whether this file was run
+
+
+@dataclass(frozen=True)
+class Field:
+    """A vector field, filtered: it has memory, plain fields, and no base class."""
+
+    standoff: float = 200.0
+    max_heading_rate: float = 0.1
+    k: float = 0.5
+    command = "heading_rate"
+
+    def start(self, context: Context) -> LawStep:
+        share = context.period / (context.period + 0.3)
+        filtered = 0.0
+
+        def step(o: Observation) -> Guidance:
+            nonlocal filtered
+            x, y = o.north - o.target_north, o.east - o.target_east
+            r, lam = hypot(x, y) - self.standoff, atan2(y, x) - pi / 2
+            error = (o.heading - lam + lean(r) + pi) % (2 * pi) - pi
+            wanted = -o.nominal_airspeed / self.standoff - self.k * error
+            filtered += share * (wanted - filtered)
+            limit = self.max_heading_rate
+            return Guidance(max(-limit, min(limit, filtered)), r, 0.0, error, 0.0, wanted)
+
+        return step
+
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        return []
+'''
+LEANING = "from math import atan\n\n\ndef lean(r):\n    return atan(0.02 * r)\n"
+MATRIX = """
+[flight]
+plant = "kinematic"
+duration_s = 40.0
+[flight.law]
+name = "field.py:Field"
+[matrix]
+"law.k" = [0.4, 0.6]
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The matrix of a folder with a law in two files, which is also the working folder."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "field.py", PLAIN)
+    write(tmp_path / "leaning.py", LEANING)
+    return write(tmp_path / "own.toml", MATRIX)
+
+
+def law_in(folder: Path, body: str) -> Path:
+    """A file with one law, `Own`, of this body."""
+    head = "from dataclasses import dataclass\nfrom autopilot.guidance import *\nfrom autopilot.standoff import *\n\n\n"
+    return write(folder / "own.py", f"{head}@dataclass(frozen=True, kw_only=True)\nclass Own(StandoffLaw):\n{body}")
+
+
+WHOLE = """
+    k: float = 0.5
+    def start(self, context): return lambda o: Guidance(*({answer}, 0.0, 0.0, 0.0, 0.0, 0.0)[:6])
+    def broken_conditions(self, speed_ratio): return []
+"""
+
+
+def test_workers_fly_it_its_file_is_kept_and_an_edited_law_is_flown_anew(own: Path) -> None:
+    run = ("run", own, "--out", own.parent / "out", "--log", "none", "--workers")
+    first = invoke(*run, 1)
+    assert "2 flown, 0 earlier, 0 failed" in first.output
+    assert "0 flown, 2 earlier" in invoke(*run, 1).output
+    write(own.parent / "leaning.py", LEANING.replace("0.02", "0.03"))
+    assert "2 flown, 0 earlier, 0 failed" in invoke(*run, 1).output
+    assert len(set(harness.load_results(own.parent / "out")["digest"])) == 4
+    write(own.parent / "leaning.py", LEANING)
+    assert "0 flown, 2 earlier" in invoke(*run, 0).output
+
+
+def test_the_key_does_not_depend_on_the_folder(own: Path, tmp_path: Path) -> None:
+    there = tmp_path / "elsewhere"
+    there.mkdir()
+    for name in ("field.py", "leaning.py"):
+        (there / name).write_bytes((own.parent / name).read_bytes())
+    overrides = ["plant=kinematic", "law.gains=custom"]
+    here, moved = (
+        harness.load_flight(EXPERIMENTS / "stationary.toml", [*overrides, f"law.name={folder}/field.py:Field"])
+        for folder in (own.parent, there)
+    )
+    assert flight_key(here) == flight_key(moved)
+    assert {"law/field.py", "law/leaning.py"} <= set(files(here))
+    assert flight_from_document(document(here)) == here
+    write(there / "leaning.py", LEANING.replace("0.02", "0.03"))
+    changed = harness.load_flight(EXPERIMENTS / "stationary.toml", [*overrides, f"law.name={there}/field.py:Field"])
+    assert flight_key(changed) != flight_key(here)
+    assert harness.simulate(changed).digest != harness.simulate(here).digest  # each with its own helper
+
+
+def test_plain_fields_are_si_but_what_all_laws_have_keeps_its_key(own: Path) -> None:
+    law = {"name": "field.py:Field", "standoff_m": "10 s", "max_heading_rate_deg_s": 9.0, "k": 0.4}
+    flight = flight_from_document({"plant": "kinematic", "law": law}, run=True)
+    made = harness.law("field.py:Field", standoff=130.0, max_heading_rate=math.radians(9.0), k=0.4)
+    assert flight.law == made
+
+
+def test_a_row_is_not_flown_with_a_law_that_has_changed(own: Path) -> None:
+    out, marker = own.parent / "out", own.parent / "was_run"
+    fly_matrix(own, out)
+    key = harness.load_results(out)["key"][0]
+    assert invoke("fly", f"{out}:{key}").exit_code == 0
+    write(own.parent / "leaning.py", LEANING + "# otherwise\n")
+    marker.unlink()
+    again = invoke("fly", f"{out}:{key}")
+    assert again.exit_code == 2
+    assert "field.py:Field: it has changed since" in again.output
+    for words in (("show", out), ("show", f"{out}:{key}"), ("compare", out, "--by", "law.k"), ("export", out)):
+        invoke(*words)
+    (own.parent / "field.py").unlink()
+    assert "there is no such file" in invoke("fly", f"{out}:{key}").output
+    assert not marker.exists()
+
+
+def test_a_recording_is_read_without_its_law(own: Path) -> None:
+    one = write(own.parent / "one.toml", MATRIX.partition("[matrix]")[0])
+    assert invoke("fly", one, "--rrd", "a.rrd").exit_code == 0
+    marker = own.parent / "was_run"
+    marker.unlink()
+    write(own.parent / "leaning.py", LEANING + "# otherwise\n")
+    assert invoke("view", "a.rrd", "--flight", "kinematic", "--save", "b.rrd").exit_code == 0
+    assert invoke("plot", "a.rrd", "--save", "a.svg").exit_code == 0
+    assert not marker.exists()
+
+
+def test_a_module_and_an_entry_point_name_a_law(own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "site" / "fieldlaws"
+    package.mkdir(parents=True)
+    write(package / "__init__.py", "")
+    write(package / "inner.py", PLAIN.replace("from leaning", "from .leaning"))
+    write(package / "leaning.py", LEANING)
+    info = tmp_path / "site" / "fieldlaws-1.dist-info"
+    info.mkdir()
+    write(info / "METADATA", "Metadata-Version: 2.1\nName: fieldlaws\nVersion: 1\n")
+    write(info / "entry_points.txt", "[standoff_harness.laws]\nfilter_field = fieldlaws.inner:Field\n")
+    monkeypatch.syspath_prepend(str(tmp_path / "site"))
+    entries.cache_clear()
+    try:
+        by_module, by_entry = (
+            flight_from_document({"plant": "kinematic", "law": {"name": name}}, run=True)
+            for name in ("fieldlaws.inner:Field", "filter_field")
+        )
+        assert by_module == by_entry
+        assert flight_key(by_module) == flight_key(by_entry)
+        read = [name for name in files(by_module) if name.startswith("law/")]
+        assert sorted(read) == ["law/fieldlaws/__init__.py", "law/fieldlaws/inner.py", "law/fieldlaws/leaning.py"]
+        assert "filter_field" in invoke("list", "laws").output
+    finally:
+        entries.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        ("1 / 0", "the law raised ZeroDivisionError"),
+        ("float('nan')", "the law commanded nan"),
+        ("'a'", "the law raised TypeError"),
+        ("0.1, 'a'", "the law answered what is no number"),
+    ],
+)
+def test_a_law_that_fails_in_flight_is_an_outcome(tmp_path: Path, answer: str, reason: str) -> None:
+    file = law_in(tmp_path, WHOLE.format(answer=answer))
+    log = harness.simulate(harness.Flight(plant="kinematic", law=harness.law(f"{file}:Own"), duration=1.0))
+    assert log.outcome is Outcome.INVALID
+    assert log.reason.startswith(reason)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("own.py", "must be one of nftsm"), ("own.py:", "must be one of nftsm"), ("nowhere.py:Own", "no such file"),
+        ("own.py:Onw", "there is no class Onw, it has Own - did you mean 'Own'"), ("own:Own", "there is no module own"),
+        ("json:Own", "Own"), ("sys:Own", "no file of Python"), ("bad.py:Own", "bad.py:2: is not valid Python"),
+        ("raises.py:Own", "raises.py:2: cannot be loaded: KeyError: 'a'"),
+        ("exits.py:Own", "exits.py:1: cannot be loaded: SystemExit"),
+    ],
+)  # fmt: skip
+def test_a_law_that_cannot_be_named_so_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    law_in(tmp_path, WHOLE.format(answer="0.1"))
+    write(tmp_path / "bad.py", "a = 1\nclass\n")
+    write(tmp_path / "raises.py", "a = {}\na['a']\n")
+    write(tmp_path / "exits.py", "raise SystemExit(3)\n")
+    done = invoke("fly", EXPERIMENTS / "stationary.toml", "--set", f"law.name={name}", "--set", "law.gains=custom")
+    assert done.exit_code == 2
+    assert len(done.output.splitlines()) == 1
+    assert done.output.startswith(f"--set law.name={name}: flight.law.name: ")
+    assert said in done.output
+
+
+def test_one_error_lists_everything_that_a_law_lacks(tmp_path: Path) -> None:
+    write(tmp_path / "own.py", "class Own:\n    k: float = 1.0\n    gain_sets = {'a': {'x': 1}}\n")
+    with pytest.raises(SettingsError) as error:
+        flight_from_document({"plant": "kinematic", "law": {"name": "own.py:Own"}}, tmp_path, run=True)
+    (line,) = error.value.lines
+    for lacking in ("dataclass", "start(", "command", "broken_conditions(", "standoff", "max_heading_rate", "sets x"):
+        assert lacking in line
+
+
+def test_fields_that_no_file_can_hold_and_laws_that_refuse_are_told(tmp_path: Path) -> None:
+    law_in(tmp_path, "    matrix: list[float]\n    name: str = ''\n" + WHOLE.format(answer="0.1"))
+    with pytest.raises(SettingsError, match=r"the field matrix must be a float.*cannot be called name"):
+        flight_from_document({"plant": "kinematic", "law": {"name": "own.py:Own"}}, tmp_path, run=True)
+    refuses = "    def __post_init__(self):\n        if self.k > 1: raise ValueError('k is too high')\n"
+    law_in(tmp_path, WHOLE.format(answer="0.1") + refuses)
+    with pytest.raises(SettingsError, match=r"^flight\.law: k is too high$"):
+        flight_from_document({"plant": "kinematic", "law": {"name": "own.py:Own", "k": 2.0}}, tmp_path, run=True)
+
+
+def test_a_named_set_gives_the_gains_and_single_ones_override_it(tmp_path: Path) -> None:
+    sets = "    gain_sets = {'soft': {'k': 0.2}, 'hard': {'k': 2.0}}\n"
+    file = law_in(tmp_path, sets + WHOLE.format(answer="0.1"))
+    settings = {"plant": "kinematic", "law": {"name": f"{file}:Own"}}
+    chosen = [{}, {"gains": "hard"}, {"gains": "hard", "k": 1.0}]
+    flights = [flight_from_document({**settings, "law": {**settings["law"], **law}}, run=True) for law in chosen]  # type: ignore[dict-item]
+    assert [document(flight)["law"]["k"] for flight in flights] == [0.2, 2.0, 1.0]
+    assert harness.law(f"{file}:Own", "hard") == flights[1].law
+    with pytest.raises(SettingsError, match='is "hrad", must be one of "soft", "hard", "custom" - did you mean'):
+        flight_from_document({**settings, "law": {**settings["law"], "gains": "hrad"}}, run=True)  # type: ignore[dict-item]
