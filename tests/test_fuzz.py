@@ -127,7 +127,9 @@ CALLS: Mapping[str, Sequence[str]] = {
         f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 {TRACKED}",
         f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --set aircraft=AIRFRAME",
         "MATRIX --out RUN --limit 8 --workers 0 --log none", "MATRIX --dry-run --limit WORD",
+        "MATRIX --dry-run --shard WORD", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --shard 2/3",
     ],
+    "merge": ["RUN RUN --out OUT/c", "RUN WORD --out OUT/c", "RUN --out OUT", "WORD --out WORD"],
     "tune": [
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --minimise range_error_peak_m",
         "MATRIX --out OUT --over WORD --minimise laps", "FILE --out OUT --over law.k2=1:9 --minimise WORD",

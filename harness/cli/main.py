@@ -38,6 +38,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
         "Many flights": {
             "init": Entry("init:init", "Write a commented experiment to start from."),
             "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),
+            "merge": Entry("merge:merge", "Make one run of the parts that several machines flew."),
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
             "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
             "tune": Entry("tune:tune", "Search for the settings that do best."),

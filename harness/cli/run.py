@@ -1,11 +1,19 @@
 """`harness run`: a matrix of flights."""
 
+from __future__ import annotations
+
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from harness.cli._paths import PATH
 from harness.cli._setting import SETTING
+
+if TYPE_CHECKING:
+    from harness.runs.matrix import Shard
 
 
 @click.command()
@@ -13,6 +21,9 @@ from harness.cli._setting import SETTING
 @click.option("--out", type=PATH, help="The folder of the results; required without --dry-run.")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--limit", type=click.IntRange(1), metavar="N", help="Fly the first N flights of the matrix only.")
+@click.option(
+    "--shard", metavar="I/N", help="Fly the I-th of N parts, each on a machine of its own; see harness merge."
+)
 @click.option(
     "--log",
     type=click.Choice(["all", "sample", "failed", "none"]),
@@ -34,6 +45,7 @@ def run(
     out: Path | None,
     workers: int | None,
     limit: int | None,
+    shard: str | None,
     log: str | None,
     overrides: tuple[str, ...],
     retry: str | None,
@@ -52,6 +64,7 @@ def run(
       harness run experiments/wind.toml --out out/wind
       harness run experiments/wind.toml --out out/wind --retry failed
       harness run experiments/stationary.toml --out out/k2 --set 'law.k2=[1,3,12]' --set 'seed={start=0,count=8}'
+      harness run experiments/wind.toml --out out/wind_2 --shard 2/4
     """
     from harness.cli._input import BadInput
     from harness.cli._matrix import fly_matrix, print_survey, print_time, processes, surveyed
@@ -66,7 +79,7 @@ def run(
         raise BadInput("--out DIR is missing: the folder of the results")
     workers = processes(workers, flight_timeout)
     try:
-        matrix = read_matrix(read_settings(file, overrides), draft=True)
+        matrix = replace(read_matrix(read_settings(file, overrides), draft=True), shard=_shard(shard))
         done = positions_done(matrix, out, retry_failed=retry is not None) if out else {}
         size = surveyed(matrix, limit, done)
         if out is not None and not dry_run:
@@ -91,3 +104,17 @@ def run(
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
     click.echo(f"next: harness show {out}, harness compare {out}")
     raise SystemExit(1 if progress.failed or progress.unrecorded else 0)
+
+
+def _shard(text: str | None) -> Shard | None:
+    """The part that `I/N` names. Raises `BadInput`."""
+    from harness.cli._input import BadInput
+    from harness.runs.matrix import Shard
+
+    if text is None:
+        return None
+    numbers = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+    part = Shard(int(numbers[1]), int(numbers[2])) if numbers else Shard(0, 0)
+    if not 1 <= part.number <= part.of:
+        raise BadInput(f"--shard is {text!r}, must be I/N with I from 1 to N, as in 2/4")
+    return part

@@ -18,6 +18,13 @@ from harness.toml_text import shown
 from harness.world.randomness import stream
 
 
+class Shard(NamedTuple):
+    """One of several parts of a matrix, for one of several machines."""
+
+    number: int  # from 1
+    of: int
+
+
 class Combination(NamedTuple):
     """One unchecked flight of a matrix: a value for each key of each axis, in file units."""
 
@@ -39,7 +46,10 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """All flights of an experiment's file: the block of [matrix], then one block per [[include]]."""
+    """All flights of an experiment's file: the block of [matrix], then one block per [[include]].
+
+    Of a `shard` only its part: flights that differ in the plant alone are in the same one.
+    """
 
     file: SettingsFile
     experiment: Experiment
@@ -48,10 +58,11 @@ class Matrix:
     given: Mapping[str, object]  # axes of the command line: the values as `--set` gives them
     mistakes: Sequence[str] = ()  # only in a draft
     mistaken: Mapping[str, int] = field(default_factory=dict)  # the keys of their axes, each with its line
+    shard: Shard | None = None
 
     @property
     def positions(self) -> int:
-        """The number of combinations; excluded ones count too."""
+        """The number of combinations; excluded ones, and those of other shards, count too."""
         return sum(len(block) for block in self.blocks)
 
     @property
@@ -79,17 +90,19 @@ class Matrix:
 
     def __len__(self) -> int:
         """The number of flights."""
-        if not self.excluded:
+        if not self.excluded and not self.shard:
             return self.positions
         return sum(1 for _ in self.combinations())
 
     def combinations(self) -> Iterator[Combination]:
-        """The combinations that are not excluded, lazily."""
+        """The combinations that are flown, lazily."""
         candidates = map(self.at, range(self.positions))
         return (combination for combination in candidates if combination is not None)
 
     def at(self, position: int) -> Combination | None:
-        """The combination at a position; None where it is excluded."""
+        """The combination at a position; None where it is excluded, or belongs to another shard."""
+        if self.shard and self.group(position) % self.shard.of != self.shard.number - 1:
+            return None
         place = position
         number = 0
         while place >= len(self.blocks[number]):
