@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 import harness
-from tests.builders import chromium, command, copied_airframe, invoke, write
+from harness.verdict import grid
+from tests.builders import chromium, command, copied_airframe, invoke, result, results, write
 
 EXPERIMENT = """\
 title = "Two limits"
@@ -281,3 +282,15 @@ def test_two_places_for_one_page_are_refused(flown: Path, tmp_path: Path) -> Non
     done = invoke("report", flown, "--out", tmp_path / "a.html", "--markdown", tmp_path / "b.md")
     assert done.exit_code == 2
     assert list(tmp_path.iterdir()) == []
+
+
+def test_many_axes_of_which_few_combinations_were_flown_are_mapped_at_once() -> None:
+    """Ten errors, one at a time: 3^10 combinations, of which 21 were flown."""
+    names = [f"errors.a{i}" for i in range(10)]
+    flown = [dict.fromkeys(names, 0.0)]
+    flown += [{**flown[0], name: size} for name in names for size in (1.0, 2.0)]
+    table = results(result(plant, 0, settings=errors) for plant in ("kinematic", "sixdof") for errors in flown)
+    axes = {name: [0.0, 1.0, 2.0] for name in names}
+    maps = grid.maps(table, axes, "range_error_rms_m", ["plant"])
+    assert sum(len(each.cells) for each in maps) == 2 * len(flown)
+    assert len(maps) == 2 * (1 + 2 * 8)

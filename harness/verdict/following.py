@@ -19,9 +19,11 @@ from harness.settings import flight_from_document
 from harness.settings.columns import is_setting, nested
 from harness.verdict.pairs import joined
 
+_ALSO = ("law.", "errors.")  # settings that a prediction depends on, or that forbid one
+
 
 def with_following(flights: pd.DataFrame) -> pd.DataFrame:
-    """The flights with `PREDICTED`; flights of equal law, airframe, airspeed and period are predicted once."""
+    """The flights with `PREDICTED`; flights of equal law, airframe, airspeed, period and errors are predicted once."""
     return _with(flights, PREDICTED, lambda flight: list(predicted(flight).values()))
 
 
@@ -34,7 +36,7 @@ def _with(
     flights: pd.DataFrame, columns: Collection[str], numbers: Callable[[Flight], Sequence[float | None]]
 ) -> pd.DataFrame:
     keys = ["aircraft", "start.airspeed_mps", "guidance_period_s"]
-    keys += [column for column in flights.columns if column.startswith("law.")]
+    keys += [column for column in flights.columns if column.startswith(_ALSO)]
     texts = joined(flights, [key for key in keys if key in flights])
     has_airframe = [PLANTS[plant].has_airframe for plant in flights["plant"]]
     rows = [text if of_airframe else "" for text, of_airframe in zip(texts, has_airframe, strict=True)]
@@ -53,7 +55,7 @@ def _flight(row: Mapping[Any, Any]) -> Flight | None:
     """A flight that is predicted as that of the row; None if its settings serve no more."""
     settings = {str(key): value for key, value in row.items() if is_setting(str(key)) and _is_there(value)}
     keep = ("plant", "aircraft", "guidance_period_s", "start.airspeed_mps")
-    chosen = {key: value for key, value in settings.items() if key in keep or key.startswith("law.")}
+    chosen = {key: value for key, value in settings.items() if key in keep or key.startswith(_ALSO)}
     try:
         return flight_from_document(nested({**chosen, "duration_s": 100.0 * settings["guidance_period_s"]}))
     except (HarnessError, OSError):

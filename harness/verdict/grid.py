@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import pandas as pd
 
@@ -84,15 +83,18 @@ def maps(
         return []
     first, second = sorted(numeric)
     fixed = [axis for axis in values if axis not in numeric]
+    places = {axis: {shown(value): i for i, value in enumerate(values[axis])} for axis in fixed}
+    by_place: dict[tuple[int, ...], list[int]] = {}  # of combinations that were flown: of many axes they are few
+    for row, flight in enumerate(flights[fixed].itertuples(index=False)):
+        by_place.setdefault(tuple(places[a][shown(v)] for a, v in zip(fixed, flight, strict=True)), []).append(row)
     found = []
-    for at in product(*(ordered(flights[axis]) for axis in fixed)):
-        there = pd.Series(True, index=flights.index)
-        for axis, value in zip(fixed, at, strict=True):
-            there &= flights[axis].map(shown) == shown(value)
-        cells = {(row, column): _cell(rows, metric) for (row, column), rows in flights[there].groupby([first, second])}
+    for place in sorted(by_place):
+        there = flights.iloc[by_place[place]]
+        at = {axis: values[axis][i] for axis, i in zip(fixed, place, strict=True)}
+        cells = {(row, column): _cell(rows, metric) for (row, column), rows in there.groupby([first, second])}
         if cells:
-            rows, columns = ((axis, ordered(flights.loc[there, axis])) for axis in (first, second))
-            found.append(Grid(metric, dict(zip(fixed, at, strict=True)), rows, columns, cells))
+            rows, columns = ((axis, ordered(there[axis])) for axis in (first, second))
+            found.append(Grid(metric, at, rows, columns, cells))
     return found
 
 

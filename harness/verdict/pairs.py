@@ -265,7 +265,7 @@ def cells(pairs: Pairs, across: Iterable[str]) -> list[Cell]:
 
 def is_drawn(flights: pd.DataFrame) -> bool:
     """Whether the seed changes anything: air, noise, or a setting that differs between its flights."""
-    noisy = {"wind.turbulence": "none", "estimator.kind": "truth"}
+    noisy = {"wind.turbulence": "none", "estimator.kind": "truth", "errors.course_noise_deg": 0.0}
     if any(name in flights and (flights[name] != quiet).any() for name, quiet in noisy.items()):
         return True
     return any(flights[column].nunique(dropna=False) > 1 for column in settings_of(flights) if column != "seed")
@@ -273,7 +273,7 @@ def is_drawn(flights: pd.DataFrame) -> bool:
 
 def ordered(values: pd.Series) -> list[object]:
     """The different values in their order: of numbers, of severities, of plants up the ladder, else of words."""
-    different = list(dict.fromkeys(values))
+    different = values.drop_duplicates().tolist()  # one NaN: a gain that other laws have
     if values.name == DIRECTORY:
         return different  # in the order in which they were named
     if is_ordered(different):
