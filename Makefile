@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence airspeed notebook verdict bench fuzz clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict bench fuzz clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -46,6 +46,9 @@ turbulence: install  ## fly the airframes in turbulence: docs/answers/turbulence
 airspeed: install  ## which airspeed a law should compute with: docs/answers/airspeed.md (two minutes)
 	$(BIN)/harness run experiments/airspeed.toml --out out/airspeed --log none
 	$(BIN)/python -m harness.studies.airspeed out/airspeed
+
+promise: install  ## fly the laws that know the inner loop: docs/answers/promise.md (two minutes)
+	$(BIN)/python -m harness.studies.promise
 
 notebook: install  ## execute docs/guide/notebook.ipynb anew: its outputs are what it says
 	$(BIN)/python docs/execute_notebook.py docs/guide/notebook.ipynb

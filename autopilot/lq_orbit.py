@@ -24,7 +24,7 @@ from autopilot.standoff import (
     relative_motion,
 )
 
-GAIN_SETS = MappingProxyType({"slow": {"weight": 50.0}})
+GAIN_SETS = MappingProxyType({"slow": {"weight": 40.0}})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
