@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from harness.comparison import compare
     from harness.error import ArgumentError, HarnessError, RecordingError, SettingsError
     from harness.flight import Flight, InnerLoop, MetricSettings
+    from harness.flight_errors import Errors
     from harness.interface import law, metrics, read_flight, record, run, simulate
     from harness.log import FlightLog
     from harness.margins import Assess
@@ -51,6 +52,7 @@ __all__ = [
     "CompareError",
     "Comparison",
     "Context",
+    "Errors",
     "Estimator",
     "Flight",
     "FlightLog",
@@ -91,6 +93,7 @@ _HOMES = {
     "harness.comparison": ["compare"],
     "harness.error": ["ArgumentError", "HarnessError", "RecordingError", "SettingsError"],
     "harness.flight": ["Flight", "InnerLoop", "MetricSettings"],
+    "harness.flight_errors": ["Errors"],
     "harness.interface": ["law", "metrics", "read_flight", "record", "run", "simulate"],
     "harness.log": ["FlightLog"],
     "harness.margins": ["Assess"],

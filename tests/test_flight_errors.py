@@ -21,6 +21,7 @@ from harness.log import FlightLog
 from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.ladder import PLANTS
+from harness.plants.lagged import Lagged
 from harness.plants.plant import Outcome, PlantError, Start
 from harness.plants.sixdof import Trim, engage, load, si, trim, write
 from harness.settings import SettingsError, flight_from_document
@@ -112,6 +113,21 @@ def test_a_delay_may_be_finer_than_a_period() -> None:
     log, _ = observed(flight, [0.3])
     turned = np.diff(log["heading"])[:4] / PERIOD
     assert turned == pytest.approx([0.0, 0.3 * 0.6, 0.3 * 0.4, 0.0], abs=1e-12)
+
+
+def test_behind_a_lag_a_delay_of_the_command_is_a_delay_of_the_response() -> None:
+    """Whole periods and a part of one: the flight of `lagged` whose response is later by as much."""
+    rates = [0.05, -0.1, 0.15, 0.2, -0.2, 0.1]
+    for delay in (0.05, 0.135):
+        flight = replace(FLIGHT, plant="lagged", duration=3.0, errors=Errors(command_delay=delay))
+        late, _ = observed(flight, rates)
+        response = identified(STICK, 13.0).heading_rate
+        later = Lagged(replace(response, delay=response.delay + delay)).start(flight.start, Air())
+        for k, rate in enumerate([*rates, *[0.0] * 54]):
+            later.advance(rate, PERIOD)
+            there = (late["north"][k + 1], late["east"][k + 1], late["heading"][k + 1], late["heading_rate"][k + 1])
+            s = later.state
+            assert (s.north, s.east, s.heading, s.heading_rate) == pytest.approx(there, abs=1e-6)
 
 
 @dataclass(frozen=True)
