@@ -1,6 +1,6 @@
 """The interface of a guidance law: its observation and its guidance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import signature
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
@@ -51,6 +51,19 @@ class Guidance(NamedTuple):
     heading_error: float  # psi_a against its desired value, in [-pi, pi)
     feed_forward: float  # the part of the command that depends on neither s nor the manifold
     unlimited_command: float
+
+
+class Telling(Guidance):
+    """An answer with channels of the law's own."""
+
+    channels: Mapping[str, float]
+
+
+def telling(guidance: Guidance, **channels: float) -> Guidance:
+    """The answer with numbers of the law's own by name: the flight's log keeps them as its columns `law_NAME`."""
+    told = Telling._make(guidance)
+    told.channels = {name: float(channels[name]) for name in channels}
+    return told
 
 
 LawStep = Callable[[Observation], Guidance]

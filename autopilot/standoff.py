@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt
 
 from autopilot.angles import wrap
-from autopilot.guidance import Guidance, LawStep, Observation
+from autopilot.guidance import Guidance, LawStep, Observation, Telling, telling
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
 PAPER_STANDOFF, PAPER_AIRSPEED = 200.0, 13.0  # m, m/s: of the circle and the aircraft of Table 1
@@ -164,7 +164,12 @@ def limited_step(
             applied(limited, max(-limit, min(limit, feed_forward)))
         return _guidance((limited, r, s, heading_error, feed_forward, unlimited))
 
-    return step if law.direction == "paper" else lambda o: _mirror_guidance(step(_mirror_observation(o)))
+    return step if law.direction == "paper" else mirrored(step)
+
+
+def mirrored(step: LawStep) -> LawStep:
+    """The same law the other way round: it circles clockwise on a map where the other circles anticlockwise."""
+    return lambda o: _mirror_guidance(step(_mirror_observation(o)))
 
 
 def _mirror_observation(o: Observation) -> Observation:
@@ -183,6 +188,7 @@ def _mirror_observation(o: Observation) -> Observation:
 
 
 def _mirror_guidance(g: Guidance) -> Guidance:
-    return Guidance(
+    turned = Guidance(
         -g.heading_rate, g.range_error, -g.sliding_variable, -g.heading_error, -g.feed_forward, -g.unlimited_command
     )
+    return telling(turned, **g.channels) if isinstance(g, Telling) else turned

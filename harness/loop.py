@@ -2,11 +2,12 @@
 
 import math
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from autopilot.guidance import Context, Guidance, Law, LawStep, Observation, started
+from autopilot.guidance import Context, Guidance, Law, LawStep, Observation, Telling, started
 from harness.checks import problems
 from harness.feasibility import margins_in_flight
 from harness.flight import Flight, air_of, context_of, plant_of
@@ -49,9 +50,11 @@ def simulate(
 
     table, rows = bytearray((last + 1) * _ROW_BYTES), 0
     outcome, reason = Outcome.COMPLETED, ""
+    told: dict[int, Mapping[str, float]] = {}  # the law's own channels, by row
 
     def log_so_far() -> FlightLog:
-        log = FlightLog(flight, outcome, reason, np.frombuffer(table).reshape(-1, len(COLUMNS))[:rows])
+        columns = np.frombuffer(table).reshape(-1, len(COLUMNS))[:rows]
+        log = FlightLog(flight, outcome, reason, columns, channels_of(told, rows))
         return completed(log, estimation.rows[:rows] if estimation else None)
 
     try:
@@ -64,6 +67,8 @@ def simulate(
             guidance = command(law, observation)
 
             _write_row(table, rows * _ROW_BYTES, time, *state, *truth, *guidance)
+            if type(guidance) is Telling:
+                told[rows] = guidance.channels
             rows += 1
             if watch:
                 watch(time, log_so_far)
@@ -106,11 +111,23 @@ def command(law: LawStep, observation: Observation) -> Guidance:
     try:
         guidance = law(observation)
         is_finite = math.isfinite(guidance.heading_rate)
+    except End:  # it took too long
+        raise
     except Exception as error:
         raise End(Outcome.INVALID, f"the law raised {type(error).__name__}: {error}") from error
     if not is_finite:
         raise End(Outcome.INVALID, f"the law commanded {guidance.heading_rate}")
     return guidance
+
+
+def channels_of(told: Mapping[int, Mapping[str, float]], rows: int) -> dict[str, NDArray[np.float64]]:
+    """The law's own channels as columns, (rows,), by the names of a log; NaN where the law did not tell."""
+    columns = {f"law_{name}": np.full(rows, math.nan) for channels in told.values() for name in channels}
+    for row, channels in told.items():
+        if row < rows:
+            for name, value in channels.items():
+                columns[f"law_{name}"][row] = value
+    return columns
 
 
 def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | None) -> FlightLog:

@@ -124,7 +124,7 @@ def test_overshoot_is_the_largest_error_beyond_the_circle() -> None:
 
 def test_saturation_counts_commands_at_the_limit() -> None:
     unlimited = np.where(TIME >= 75.0, 1.0, 0.01)
-    command = np.minimum(unlimited, 0.08)
+    command = np.minimum(unlimited, FLIGHT.law.max_heading_rate)
     judged = measured({"heading_rate_command": command, "unlimited_command": unlimited})
     assert judged["saturation_fraction"] == pytest.approx(0.25, abs=0.01)
 

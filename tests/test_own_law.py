@@ -3,10 +3,14 @@
 import math
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import harness
 from harness.key import files, flight_key
+from harness.limit_cycle.margin import margin_of
+from harness.log.signals import at_limit
 from harness.plants.plant import Outcome
 from harness.settings import SettingsError, document, flight_from_document
 from harness.settings.laws import entries
@@ -246,3 +250,121 @@ def test_a_named_set_gives_the_gains_and_single_ones_override_it(tmp_path: Path)
     assert harness.law(f"{file}:Own", "hard") == flights[1].law
     with pytest.raises(SettingsError, match='is "hrad", must be one of "soft", "hard", "custom" - did you mean'):
         flight_from_document({**settings, "law": {**settings["law"], "gains": "hrad"}}, run=True)  # type: ignore[dict-item]
+
+
+def test_a_law_has_channels_of_its_own_in_the_log_and_in_a_recording(tmp_path: Path) -> None:
+    assert invoke("init", "--law", tmp_path / "mine.py").exit_code == 0
+    for direction in ("paper", "mirrored"):
+        law = harness.law(f"{tmp_path}/mine.py:MyLaw", direction=direction)
+        log = harness.simulate(harness.Flight(plant="kinematic", law=law, duration=10.0))
+        assert log["law_leaning"] == pytest.approx(np.arctan(0.02 * log["range_error"]))
+        assert log.frame()["law_leaning"].tolist() == log["law_leaning"].tolist()
+    harness.record(log, tmp_path / "a.rrd")
+    pd.testing.assert_frame_equal(harness.read_flight(tmp_path / "a.rrd"), log.frame())
+
+
+def test_the_law_that_init_writes_passes_its_check_and_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    assert invoke("init", "--law", file).exit_code == 0
+    checked = invoke("check", file)
+    assert checked.exit_code == 0, checked.output
+    assert checked.output.endswith(f"{file}: ok\n")
+    assert "WRONG" not in checked.output
+    assert invoke("init", "--law", file).exit_code == 2
+
+
+def test_the_check_finds_what_is_wrong_with_a_law(tmp_path: Path) -> None:
+    file = law_in(
+        tmp_path,
+        """
+    def start(self, context):
+        def step(o):
+            asked.append(o)
+            return Guidance(1e-3 * len(asked), 0.0, 0.0, 0.0, 0.0, 0.0)
+        return step
+    def broken_conditions(self, speed_ratio): return []
+
+asked = []
+""",
+    )
+    checked = invoke("check", file)
+    assert checked.exit_code == 2
+    for question in ("limited", "deterministic", "no global state", "mirrored"):
+        assert f"{file}: Own: {question}: " in checked.output
+
+
+def test_a_law_that_is_slow_is_a_warning_and_one_that_hangs_ends_the_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = law_in(
+        tmp_path,
+        """
+    def start(self, context):
+        def step(o):
+            time.sleep(0.002)
+            while o.time > 0.2 and self.standoff == 190.0: pass
+            return Guidance(0.05, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return step
+    def broken_conditions(self, speed_ratio): return []
+
+import time
+""",
+    )
+    for name in ("ANSWERS_WITHIN", "TRIED_WITHIN"):
+        monkeypatch.setattr(f"harness.settings.tried.{name}", 0.4)
+    words = ("fly", EXPERIMENTS / "stationary.toml", "--set", f"law.name={file}:Own", "--set", "law.gains=custom",
+             "--set", "duration_s=0.5", "--set", "plant=kinematic", "--set")  # fmt: skip
+    slow = invoke(*words, "law.standoff_m=180")
+    assert slow.exit_code == 0
+    assert "warning: the law takes 2." in slow.output
+    hangs = invoke(*words, "law.standoff_m=190")
+    assert hangs.exit_code == 1
+    assert "outcome: timeout: the law gave no answer in 0.4 s" in hangs.output
+
+
+def test_a_filtered_command_is_saturated_only_at_its_limit(own: Path) -> None:
+    law = harness.law("field.py:Field", max_heading_rate=0.0651)
+    log = harness.simulate(harness.Flight(plant="kinematic", law=law, duration=60.0))
+    below = np.abs(log["heading_rate_command"]) < np.abs(log["unlimited_command"])
+    assert at_limit(log).tolist() == (np.abs(log["heading_rate_command"]) == 0.0651).tolist()
+    assert at_limit(log).sum() < below.sum()
+
+
+@pytest.mark.parametrize("name", ["nftsm", "npfg", "nftsm_lead"])
+def test_of_the_laws_of_the_package_the_same_rows_are_at_the_limit_as_ever(name: str) -> None:
+    law = harness.law(name, max_heading_rate=math.radians(3.8))
+    log = harness.simulate(harness.Flight(plant="lagged", law=law, duration=60.0))
+    below = np.abs(log["heading_rate_command"]) < np.abs(log["unlimited_command"])
+    assert below.any()
+    assert at_limit(log).tolist() == below.tolist()
+
+
+def test_a_law_that_circles_the_other_way_has_the_same_prediction(tmp_path: Path) -> None:
+    clockwise = PLAIN.replace("from leaning import lean", "lean = lambda r: atan(0.02 * r)").replace(
+        "filtered += share * (wanted - filtered)", "filtered = wanted"
+    )
+    turned = clockwise.replace("return step\n", "return mirrored(step)\n").replace(
+        "from math", "from autopilot.standoff import mirrored\nfrom math", 1
+    )
+    margins = []
+    for name, text in (("one.py", clockwise), ("other.py", turned)):
+        write(tmp_path / name, text.replace('open("was_run", "a").close()', ""))
+        law = harness.law(f"{tmp_path / name}:Field", k=8.0)
+        margins.append(margin_of(harness.Flight(plant="lagged", law=law)))
+    assert margins[0] == pytest.approx(margins[1])
+    assert margins[0] is not None
+
+
+def test_laws_of_one_file_name_in_two_folders_are_told_apart_and_compared(own: Path) -> None:
+    other = own.parent / "other"
+    other.mkdir()
+    write(other / "field.py", PLAIN.replace("k: float = 0.5", "k: float = 0.7"))
+    write(other / "leaning.py", LEANING.replace("0.02", "0.03"))
+    both = MATRIX.replace('"law.k" = [0.4, 0.6]', '"law.name" = ["field.py:Field", "other/field.py:Field"]')
+    file = write(own.parent / "both.toml", both)
+    ran = invoke("run", file, "--out", "out", "--workers", 0, "--log", "none")
+    assert "2 flown, 0 earlier, 0 failed" in ran.output
+    assert ran.output.count("/field.py:Field ") == 2
+    compared = invoke("compare", "out")
+    assert compared.exit_code == 0, compared.output
+    assert f"law.name = {other}/field.py:Field beside {own.parent}/field.py:Field" in compared.output

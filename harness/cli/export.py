@@ -59,15 +59,12 @@ def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
 
     try:
         if place := row_address(what):
-            import pandas as pd
-
-            from harness.log import COLUMNS
             from harness.runs.logs import flight_of_row
 
             if flight is not None:
                 raise BadInput(f"{what}: is one flight already; --flight is for a FILE.rrd")
             log = flight_of_row(place.folder, place.beginning, lambda line: click.echo(line, err=True))
-            return pd.DataFrame(log.table, columns=list(COLUMNS)), find(*place).row["key"]
+            return log.frame(), find(*place).row["key"]
         if Path(what).is_dir():
             if flight is not None:
                 raise BadInput(f"{what}: is a folder of flights; --flight is for a FILE.rrd")

@@ -11,6 +11,10 @@ from harness.cli._paths import PATH, PATH_OR_ROW
 from harness.cli._setting import SETTING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from harness.flight import Flight
+    from harness.log import FlightLog
     from harness.review.live import Live
     from harness.runs.recall import Recalled, RowAddress
     from harness.runs.row import FlightResult, FlightRow
@@ -61,6 +65,8 @@ def fly(
     from harness.runs.description import changes, ending, flown, metric_lines
     from harness.runs.recall import row_address
     from harness.runs.row import json_of, result_of, row
+    from harness.settings.laws import source_of
+    from harness.settings.tried import slowness
 
     if against is not None and as_json:
         raise BadInput("--against and --json exclude each other")
@@ -79,9 +85,10 @@ def fly(
     this = identity(flight)
     click.echo(feasibility_line(flight), err=as_json)
     click.echo(flown(this.settings), err=as_json)
-    for warning in warnings(flight):
+    own = source_of(flight.law) is not None
+    for warning in [*warnings(flight), *(slowness(flight) if own else ())]:
         click.echo(f"warning: {warning}", err=True)
-    log = simulate(flight, stream)
+    log = _watched(flight, stream) if own else simulate(flight, stream)
     if stream:
         stream.finish(log, typed())
         if stream.gone:
@@ -111,6 +118,21 @@ def fly(
         click.echo(f"outcome: {log.outcome}{f': {log.reason}' if log.reason else ''}")
         click.echo(f"key {flight_row['key']}  digest {flight_row['digest']}")
     raise SystemExit(1 if log.outcome.failed else 0)
+
+
+def _watched(flight: Flight, stream: Live | None) -> FlightLog:
+    """The flight of a law of one's own, which may hang: that ends it."""
+    from harness.loop import simulate
+    from harness.settings import tried
+
+    with tried.within(tried.ANSWERS_WITHIN) as anew:
+
+        def watch(time: float, so_far: Callable[[], FlightLog]) -> None:
+            if stream:
+                stream(time, so_far)
+            anew()
+
+        return simulate(flight, watch)
 
 
 def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live:

@@ -29,14 +29,14 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
     {
         "One flight": {
             "fly": Entry("fly:fly", "Fly one flight and print its metrics."),
-            "check": Entry("check:check", "Check a settings file without flying it."),
+            "check": Entry("check:check", "Check a settings file, or a law of your own, without flying it."),
             "predict": Entry("predict:predict", "Predict the limit cycle of a flight without flying it."),
             "view": Entry("view:view", "Open flights in the Rerun viewer."),
             "plot": Entry("plot:plot", "Draw flights, or a map of a run, as a figure in print size."),
             "export": Entry("export:export", "Write the log of a flight, or the flights of a run, as a table."),
         },
         "Many flights": {
-            "init": Entry("init:init", "Write a commented experiment to start from."),
+            "init": Entry("init:init", "Write a commented experiment, or law, to start from."),
             "run": Entry("run:run", "Fly a matrix of flights, or resume it where it stopped."),
             "merge": Entry("merge:merge", "Make one run of the parts that several machines flew."),
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from autopilot.guidance import Context, Law, Observation, started
+from autopilot.guidance import Context, Law, LawStep, Observation, started
 from autopilot.response import Response, critical_gain
+from autopilot.standoff import mirrored
 from harness.chatter import VISIBLE
 
 Array = NDArray[np.float64]
@@ -71,20 +72,34 @@ class Loop:
 
     def commands(self, e: Array, r: Array) -> Array:
         """The commands of the law, rad/s, at these heading errors, rad, and range errors, m; equal shapes."""
-        law: Any = self.law
-        step = started(replace(law, direction="paper") if hasattr(law, "direction") else law, self.context)
         R_d, v_a = self.law.standoff, self.airspeed
 
-        def command(e: float, r: float) -> float:
+        def seen(e: float, r: float) -> Observation:
             psi = e - 0.5 * math.pi  # due north of the target, at the origin, the paper's circle goes west
             own = (R_d + r, 0.0, v_a * math.cos(psi), v_a * math.sin(psi), v_a, psi, *_UNKNOWN, v_a)
-            guidance = step(Observation._make((*own, *(0.0,) * 9)))
+            return Observation._make((*own, *(0.0,) * 9))
+
+        step = self._in_the_papers_direction(seen(0.0, 0.0))
+
+        def command(e: float, r: float) -> float:
+            guidance = step(seen(e, r))
             if self.gain == 1.0:
                 return float(guidance.heading_rate)
             wanted = self.turn + self.gain * (guidance.unlimited_command - self.turn)
             return float(np.clip(wanted, -self.law.max_heading_rate, self.law.max_heading_rate))
 
         return np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)])
+
+    def _in_the_papers_direction(self, on_the_circle: Observation) -> LawStep:
+        """The law in flight; one that has no setting for it is turned round if it circles the other way."""
+        law: Any = self.law
+        if hasattr(law, "direction"):
+            return started(replace(law, direction="paper"), self.context)
+        off = [
+            abs(step(on_the_circle).heading_rate - self.turn)
+            for step in (started(law, self.context), mirrored(started(law, self.context)))
+        ]
+        return started(law, self.context) if off[0] <= off[1] else mirrored(started(law, self.context))
 
 
 class _Cycle(NamedTuple):

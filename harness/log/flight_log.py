@@ -1,8 +1,8 @@
 """The log of a flight: one row per guidance period, a column per quantity."""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,6 +75,8 @@ class FlightLog:
       `target_velocity_east_variance`: of the estimate; `innovation_range`, `innovation_azimuth`: of the latest
       measurement since the row before, NaN without one.
 
+    - `law_NAME`: the channels of a law of one's own, see `autopilot.guidance.telling`.
+
     >>> log = harness.simulate(flight)
     >>> log["range_error"][-1], log.metrics["convergence_time_s"]
     """
@@ -83,6 +85,7 @@ class FlightLog:
     outcome: Outcome
     reason: str  # why it ended early, or empty
     table: NDArray[np.float64]  # (rows, len(COLUMNS))
+    channels: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)  # the law's own, (rows,): `law_NAME`
 
     def __repr__(self) -> str:
         flown = f"{self['time'][-1]:g} s of " if len(self) else ""
@@ -90,13 +93,26 @@ class FlightLog:
         return f"<FlightLog: {flown}{law} on {plant}, {self.flight.aircraft}, {self.outcome}, {len(self)} rows>"
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
-        """The column, (rows,). KeyError for a name that is none of `COLUMNS`."""
+        """The column, (rows,). KeyError for a name that is none of `COLUMNS` and no channel of the law."""
+        if column in self.channels:
+            return self.channels[column]
         if column not in COLUMNS:
-            raise KeyError(f"no column {column!r}{did_you_mean(column, COLUMNS)}; the columns are {', '.join(COLUMNS)}")
+            known = [*COLUMNS, *self.channels]
+            raise KeyError(f"no column {column!r}{did_you_mean(column, known)}; the columns are {', '.join(known)}")
         return self.table[:, COLUMNS.index(column)]
 
     def __len__(self) -> int:
         return len(self.table)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of all columns, those of the law's own channels last."""
+        return (*COLUMNS, *self.channels)
+
+    @property
+    def whole(self) -> NDArray[np.float64]:
+        """The table with the law's own channels; (rows, len(columns))."""
+        return np.column_stack([self.table, *self.channels.values()]) if self.channels else self.table
 
     @property
     def digest(self) -> str:
@@ -123,7 +139,7 @@ class FlightLog:
         """
         import pandas as pd
 
-        return pd.DataFrame(self.table, columns=COLUMNS, copy=True)
+        return pd.DataFrame(self.whole, columns=self.columns, copy=True)
 
     def plot(self, *others: "FlightLog", panels: Sequence[str] = ()) -> "Figure":
         """A matplotlib figure of this flight, and of `others` over it, up to six in all, in the size of print.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.log.flight_log import FlightLog
-from harness.log.signals import AVERAGED_OVER, LEAST_EXCITATION, Signals
+from harness.log.signals import AVERAGED_OVER, LEAST_EXCITATION, Signals, at_limit
 from harness.plants.ladder import PLANTS
 from harness.plants.turn import bank_of_turn, rate_of_turn
 from harness.series import overshoot, peak, rms
@@ -90,8 +90,7 @@ def window_in_words(metrics: Mapping[str, Value]) -> str:
 
 
 def _saturation(signals: Signals) -> float:
-    command, unlimited = (signals.circling(column) for column in ("heading_rate_command", "unlimited_command"))
-    return float(np.mean(np.abs(command) < np.abs(unlimited)))
+    return float(np.mean(at_limit(signals.log)[signals.window.first :]))
 
 
 def _activity(signals: Signals) -> float:

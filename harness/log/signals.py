@@ -118,6 +118,17 @@ class Signals:
         return self.oscillation if self.oscillation and self.oscillation.chatters else None
 
 
+def at_limit(log: FlightLog) -> NDArray[np.bool_]:
+    """In which rows the command is at the limit of its law; a command that is filtered may be less than it wants.
+
+    A limit in course rate is another heading rate in each direction: there the law says itself that it wants more.
+    """
+    command, law = np.abs(log["heading_rate_command"]), log.flight.law
+    if law.command == "course_rate":
+        return command < np.abs(log["unlimited_command"])
+    return np.asarray(command >= law.max_heading_rate * (1.0 - 1e-12))
+
+
 def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | None, float | None]:
     """The delay at which the command explains most of the flown rate's variation, and the ratio there.
 

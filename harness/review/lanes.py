@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import aircraft
 from harness.chatter import swinging
 from harness.log import FlightLog
-from harness.log.signals import Signals
+from harness.log.signals import Signals, at_limit
 from harness.plants.plant import Outcome
 from harness.review.styled import Colour
 
@@ -134,7 +134,7 @@ def events(log: FlightLog, lanes: Mapping[str, Sequence[Change]], shared: bool =
 
 def command_lane(log: FlightLog) -> list[Change]:
     """Whether the command is at its limit: for a whole window, for part of it, or not at all."""
-    held = np.abs(log["heading_rate_command"]) < np.abs(log["unlimited_command"])
+    held = at_limit(log)
     shares = [float(part.mean()) for part in _windows(log, held.astype(float))]
     return _lane(log, ["at the limit" if s == 1.0 else "on and off the limit" if s else "free" for s in shares])
 

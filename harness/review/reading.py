@@ -49,14 +49,16 @@ def read_logs(path: Path) -> dict[str, FlightLog]:
 
     logs, places = {}, {}
     for name, (columns, table, flight) in _read(path).items():
-        if tuple(columns) != COLUMNS or not flight:
+        own = columns[len(COLUMNS) :]  # the law's
+        if columns[: len(COLUMNS)] != [*COLUMNS] or not all(name.startswith("law_") for name in own) or not flight:
             raise ValueError(f"{path}: {name} was recorded by another version, with other columns")
         known = json.loads(flight)
         try:
             settings = _flight(known["flight"])
         except SettingsError as error:
             raise ValueError(f"{path}: {name}: {error}") from error
-        logs[name] = FlightLog(settings, Outcome(known["outcome"]), known["reason"], table)
+        channels = {channel: table[:, len(COLUMNS) + i] for i, channel in enumerate(own)}
+        logs[name] = FlightLog(settings, Outcome(known["outcome"]), known["reason"], table[:, : len(COLUMNS)], channels)
         places[name] = known["place"]
     return {name: logs[name] for name in sorted(logs, key=lambda name: places[name])}
 

@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 
 from harness.files import as_text, replacing
-from harness.log import COLUMNS, FlightLog
+from harness.log import FlightLog
 from harness.review.charts import charts, log_chart
 from harness.review.differences import difference_plots
 from harness.review.lanes import COLOURS, Change, events, lanes, lanes_by_flight
@@ -83,8 +83,8 @@ def log_values(to: Recorder, entity: str, series: Series) -> None:
 def log_rows(to: Recorder, name: str, rows: FlightLog) -> None:
     """Logs the rows of the log unchanged, as vectors: they take a third of the space of an entity per column."""
     entity = f"{to.flight(name)}/log"
-    to.once(entity, rr.SeriesLines(names=COLUMNS))
-    vectors = rr.Scalars.columns(scalars=rows.table.ravel()).partition([len(COLUMNS)] * len(rows))
+    to.once(entity, rr.SeriesLines(names=rows.columns))
+    vectors = rr.Scalars.columns(scalars=rows.whole.ravel()).partition([len(rows.columns)] * len(rows))
     to.columns(entity, rows["time"], vectors)
 
 

@@ -10,6 +10,7 @@ from harness.files import as_text, replacing
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.runs.store import StoreError, last_run, reading, state
 from harness.settings.columns import by_column, is_setting
+from harness.settings.laws import FILES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,15 +167,18 @@ def versions(folder: Path) -> dict[str, dict[str, int]]:
     with reading(folder) as journal:
         groups = journal.execute(
             "SELECT v.decides, json_extract(f.settings, '$.aircraft'), json_extract(f.settings, '$.target.track'), "
-            "count(*) FROM flights f JOIN versions v ON v.id = f.version GROUP BY 1, 2, 3"
+            "json_extract(f.settings, '$.law.name'), count(*) "
+            "FROM flights f JOIN versions v ON v.id = f.version GROUP BY 1, 2, 3, 4 ORDER BY min(f.rowid)"
         )
-        for decides, airframe, track, count in groups:
+        for decides, airframe, track, law, count in groups:
             version = json.loads(decides)
             for what, which in (*version.pop("content").items(), *version.items()):
                 if which is None:
                     continue
                 if what.startswith("aircraft/"):
                     what = f"{what} of {airframe}"
+                elif what.startswith(FILES):
+                    what = f"{what} of {law}"
                 elif what == "target/track":
                     what = f"the track {track}"
                 of = counts.setdefault(what, {})
