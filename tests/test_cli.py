@@ -336,7 +336,7 @@ COMPLETED = [
     ("predict x.toml --set", "plant=s", ["plant=sixdof"]),
     ("fly x.toml --set", "aircraft=sky", ["aircraft=skywalker_x8"]),
     ("fly x.toml --set", "inner_loop.rate_trim=", ["inner_loop.rate_trim=true", "inner_loop.rate_trim=false"]),
-    ("show out --where", "law.k2=", ["law.k2=12"]),
+    ("show out --where", "law.k2=", ["law.k2=12", "law.k2=3"]),
     ("compare out --set", "assess.turn", ["assess.turn_ratio=", "assess.turn_ratio=0.05"]),
     ("compare out --set", "law.", []),
     ("fly x.toml --set", "wind.s", ["wind.steady_mps=", "wind.shear_mps_per_m="]),

@@ -27,7 +27,7 @@ from harness.plants.sixdof import Trim, engage, load, si, trim, write
 from harness.settings import SettingsError, flight_from_document
 from harness.world.air import Air
 from harness.world.wind import Wind
-from tests.builders import FLIGHT, SIXDOF, OwnLaw, invoke, turning
+from tests.builders import EXPERIMENTS, FLIGHT, SIXDOF, OwnLaw, invoke, turning
 from tests.builders import write as file_of
 
 STICK = aircraft.folder("ultra_stick_25e")
@@ -300,3 +300,10 @@ def test_each_aircraft_of_a_matrix_is_tried_before_it_flies(tmp_path: Path) -> N
 def test_of_a_loop_that_an_error_changes_nothing_is_predicted(errors: Errors) -> None:
     assert why_unknown(replace(SIXDOF, errors=errors)).startswith("the prediction does not know of errors.")
     assert why_unknown(replace(SIXDOF, errors=Errors(wind=1.0))) == ""
+
+
+def test_the_command_predict_warns_of_an_error_that_it_leaves_out() -> None:
+    stationary = EXPERIMENTS / "stationary.toml"
+    told = invoke("predict", stationary, "--set", "errors.command_delay_s=0.1")
+    assert told.stderr == "warning: the prediction does not know of errors.command_delay\n"
+    assert invoke("predict", stationary, "--set", "errors.wind_mps=1.0").stderr == ""

@@ -32,6 +32,7 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
     from harness.checks import airframe_of
     from harness.cli._input import BadInput, flight_of, read_file
     from harness.limit_cycle.margin import ENOUGH, following
+    from harness.limit_cycle.predicted import unforeseen
     from harness.limit_cycle.prediction import Loop, boundary
     from harness.plants.identified import IdentifiedError, identified
 
@@ -46,6 +47,8 @@ def predict(file: Path, overrides: tuple[str, ...]) -> None:
     found = following(flight)
     if loop.law.max_heading_rate <= abs(loop.turn):
         raise BadInput(f"{settings.locate('law.max_heading_rate')}: {found.reason}")
+    if reason := unforeseen(flight):
+        click.echo(f"warning: {reason}", err=True)
     bandwidth = loop.response.bandwidth
     click.echo(
         f"{flight.aircraft} at {flight.start.airspeed:g} m/s: bandwidth {bandwidth:.3g} rad/s, "

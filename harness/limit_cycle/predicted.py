@@ -52,11 +52,17 @@ def why_unknown(flight: Flight) -> str:
     return _why_not(flight) or following(flight).reason
 
 
+def unforeseen(flight: Flight) -> str:
+    """Which error of the flight a prediction leaves out; empty when it leaves out none."""
+    misled = flight.errors.response_speed != 1.0 and uses_response(flight.law)
+    left_out = [*flight.errors.of_loop, *(["response_speed"] if misled else [])]
+    return f"the prediction does not know of errors.{left_out[0]}" if left_out else ""
+
+
 def _why_not(flight: Flight) -> str:
     """What keeps from asking for a prediction; empty when nothing does."""
-    misled = flight.errors.response_speed != 1.0 and uses_response(flight.law)
-    if changed := [*flight.errors.of_loop, *(["response_speed"] if misled else [])]:
-        return f"the prediction does not know of errors.{changed[0]}"
+    if reason := unforeseen(flight):
+        return reason
     if not PLANTS[flight.plant].has_airframe:
         return f"the plant {flight.plant} has no airframe"
     try:
