@@ -111,7 +111,7 @@ def page(results: Sequence[Found], points: int) -> Iterator[str]:
     yield ""
     yield f"Does `harness tune` find the gains that a fine grid finds, with {SHARE:.0%} of its flights?"
     yield ""
-    yield "`python -m benchmarks.tuned_gains` flies and writes this page (a quarter of an hour)."
+    yield "`make tuned_gains` flies and writes this page (a quarter of an hour)."
     yield f"The conditions are those of `experiments/tune.toml`: {conditions} flights for each pair of gains, in still"
     yield "air and in 5 m/s of wind."
     yield "Minimised is the worse settled error (rms) of the two; each flight has to be quiet, and to keep 1.5 times"

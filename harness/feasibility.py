@@ -108,8 +108,11 @@ def feasibility_line(flight: Flight) -> str:
     )
 
 
-def warnings(flight: Flight) -> list[str]:
-    """Sentences that a user should know before trusting the flight, which can be flown all the same."""
+def warnings(flight: Flight, *, of_circle: bool = True) -> list[str]:
+    """Sentences that a user should know before trusting the flight, which can be flown all the same.
+
+    With `of_circle` also that the circle is infeasible, which `feasibility_line` says.
+    """
     sentences = []
     v_a = flight.start.airspeed
     fastest = max(math.hypot(s.target_velocity_north, s.target_velocity_east) for s in target_states(flight))
@@ -118,9 +121,9 @@ def warnings(flight: Flight) -> list[str]:
         sentences.append(
             f"Remark 1 requires v_t + v_w < v_a; here v_t + v_w is {ratio * v_a:.3g} m/s and v_a is {v_a:g} m/s"
         )
-    if is_outrun(flight):
+    if of_circle and is_outrun(flight):
         sentences.append(f"the circle is infeasible: {_outrun(flight)}")
-    elif feasibility_margin(flight) < 0:
+    elif of_circle and feasibility_margin(flight) < 0:
         sentences.append("the circle is infeasible: holding it takes more than the heading-rate limit")
     if flight.wind.gusts and (gusty := _strongest_wind(flight)) >= v_a:
         sentences.append(f"wind and gusts reach {gusty:.3g} m/s, the airspeed is {v_a:g} m/s")

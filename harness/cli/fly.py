@@ -86,7 +86,7 @@ def fly(
     click.echo(feasibility_line(flight), err=as_json)
     click.echo(flown(this.settings), err=as_json)
     own = source_of(flight.law) is not None
-    for warning in [*warnings(flight), *(slowness(flight) if own else ())]:
+    for warning in [*warnings(flight, of_circle=False), *(slowness(flight) if own else ())]:
         click.echo(f"warning: {warning}", err=True)
     log = _watched(flight, stream) if own else simulate(flight, stream)
     if stream:

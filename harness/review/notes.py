@@ -29,7 +29,10 @@ def result_notes(flights: Sequence[StyledFlight], title: str, above: str, comman
     parts += [above] if above else []
     names_by_line: dict[str, list[str]] = {}
     for flight in flights:
-        for line in (feasibility_line(flight.log.flight), *(f"warning: {w}" for w in warnings(flight.log.flight))):
+        for line in (
+            feasibility_line(flight.log.flight),
+            *(f"warning: {w}" for w in warnings(flight.log.flight, of_circle=False)),
+        ):
             names_by_line.setdefault(line, []).append(flight.name)
     of = {line: "" if len(names) == len(flights) else f" ({', '.join(names)})" for line, names in names_by_line.items()}
     parts.append("\n".join(f"- {as_markdown(f'{line}{of[line]}')}" for line in names_by_line))

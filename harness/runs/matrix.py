@@ -99,9 +99,13 @@ class Matrix:
         candidates = map(self.at, range(self.positions))
         return (combination for combination in candidates if combination is not None)
 
+    def has(self, position: int) -> bool:
+        """Whether the position belongs to the shard."""
+        return self.shard is None or self.group(position) % self.shard.of == self.shard.number - 1
+
     def at(self, position: int) -> Combination | None:
         """The combination at a position; None where it is excluded, or belongs to another shard."""
-        if self.shard and self.group(position) % self.shard.of != self.shard.number - 1:
+        if not self.has(position):
             return None
         place = position
         number = 0

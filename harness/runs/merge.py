@@ -80,7 +80,7 @@ def _add(journal: sqlite3.Connection, other: sqlite3.Connection) -> tuple[int, l
     for table in ("files", "versions", "positions"):
         _copy(journal, other, "INSERT OR IGNORE", table, f"SELECT * FROM {table}")
     columns = ", ".join(name for _, name, *_ in other.execute("PRAGMA table_info(runs)") if name != "id")
-    _copy(journal, other, "INSERT", "runs", f"SELECT id + {runs}, {columns} FROM runs")
+    _copy(journal, other, "INSERT", f"runs (id, {columns})", f"SELECT id + {runs}, {columns} FROM runs")
     names = [name for _, name, *_ in other.execute("PRAGMA table_info(flights)")]
     chosen = ", ".join(f"run + {runs}" if name == "run" else name for name in names)
     known = dict(journal.execute(f"SELECT key, digest FROM flights WHERE outcome NOT IN ({_FAILED})"))
