@@ -15,7 +15,7 @@ from harness.cli._input import BadInput, flight_of, read_file
 from harness.cli._paths import writable, writable_folder
 from harness.cli.main import COMMANDS, Entry, load
 from harness.cli.main import harness as command_line
-from tests.builders import command, copied_airframe, invoke, python, words_of, write
+from tests.builders import ROOT, command, copied_airframe, invoke, python, words_of, write
 
 FILE = """\
 [flight]
@@ -358,3 +358,13 @@ def test_bash_is_given_the_completion() -> None:
     main = "import sys; sys.argv[0] = 'harness'; from harness.cli.main import main; main()"
     done = subprocess.run([sys.executable, "-c", main], env={**os.environ, **words}, capture_output=True, check=False)
     assert done.stdout == b"plain,plant=lagged\n"
+
+
+@pytest.mark.parametrize("words", ["fly a.toml", "list laws", "--help"])
+def test_a_working_directory_that_is_gone_is_told(tmp_path: Path, words: str) -> None:
+    line = f"cd {tmp_path}; mkdir gone; cd gone; rmdir ../gone; {sys.executable} -m harness {words}"
+    done = subprocess.run(
+        ["sh", "-c", line], capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": str(ROOT)}
+    )
+    assert done.returncode == 2
+    assert done.stderr == "the working directory no longer exists: change to another one, with cd\n"

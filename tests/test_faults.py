@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import errno
 import itertools
 import os
 import random
@@ -24,7 +25,7 @@ import harness
 from autopilot.guidance import Guidance, LawStep, Observation
 from harness.review.reading import read_logs
 from harness.runs.recordings import recording_path
-from harness.runs.store import JOURNAL, StoreError, reading
+from harness.runs.store import JOURNAL, Store, StoreError, reading
 from harness.runs.workers import Task, WorkerResult, fly_task
 from tests.builders import WORKERS, OwnLaw, command, digests, fly_matrix, turning, words_of, write
 
@@ -282,6 +283,29 @@ def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:
     finally:
         first.send_signal(signal.SIGINT)
         first.communicate(timeout=20)
+
+
+def test_a_flight_for_which_there_is_too_little_memory_is_a_row_and_is_flown_again(tmp_path: Path) -> None:
+    """20 000 s at 200 Hz: a log of 2 GB, where a process may have 2.6 GB."""
+    text = KINEMATIC.format(count=1, duration=10.0).replace("[flight]", "[flight]\nguidance_period_s = 0.005")
+    file = write(tmp_path / "matrix.toml", f"{text}duration_s = [10.0, 20000.0]\n")
+    line = shlex.join(words_of(*words(file, tmp_path / "out")))
+    done = subprocess.run(["sh", "-c", f"ulimit -v 2600000; {line}"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert "failed: 1 x worker_died: the machine had too little memory for it" in done.stdout
+    assert "the same command flies them again" in done.stdout
+    outcomes = harness.load_results(tmp_path / "out").set_index("duration_s")["outcome"]
+    assert outcomes.to_dict() == {10.0: "completed", 20000.0: "worker_died"}
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    def without_locks(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("fcntl.lockf", without_locks)
+    with pytest.raises(StoreError, match=r"its file system cannot lock a file \(.*\): use a folder on another one"):
+        Store(tmp_path / "out")
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -117,6 +118,11 @@ def main() -> None:
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     if message := in_the_way():
         click.echo(message, err=True)
+        sys.exit(2)
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        click.echo("the working directory no longer exists: change to another one, with cd", err=True)
         sys.exit(2)
     try:
         code = harness.main(standalone_mode=False)

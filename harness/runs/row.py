@@ -68,9 +68,14 @@ def failed_result(outcome: Outcome, reason: str) -> FlightResult:
 
 
 def simulate_safely(flight: Flight, watch: Watch | None = None) -> FlightLog:
-    """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others."""
+    """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others.
+
+    Raises MemoryError.
+    """
     try:
         return simulate(flight, watch)
+    except MemoryError:
+        raise  # the machine's fault, not the flight's
     except Exception as error:  # any kind: the other flights of the run are unaffected
         reason = f"{error.key}: {error}" if isinstance(error, PlantError) else f"{type(error).__name__}: {error}"
         return FlightLog(flight, Outcome.INVALID, f"it cannot start: {reason}", np.empty((0, len(COLUMNS))))

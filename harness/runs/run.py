@@ -203,7 +203,8 @@ def positions_done(matrix: Matrix, folder: Path, *, retry_failed: bool) -> Mappi
                 continue  # its files are gone
             if now.number == version:
                 current.append(version)
-        return positions(journal, matrix.identifier, current, retry_failed=retry_failed)
+        done = positions(journal, matrix.identifier, current, retry_failed=retry_failed)
+    return {position: key for position, key in done.items() if matrix.has(position)}
 
 
 def _recorded(matrix: Matrix, options: Options, total: int) -> Callable[[int], str]:

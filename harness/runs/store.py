@@ -8,6 +8,7 @@ import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from errno import EACCES, EAGAIN
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -399,9 +400,12 @@ def _locked(path: Path) -> int:
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    except OSError as error:
         by = os.read(lock, 200).decode(errors="replace").strip()
         os.close(lock)
+        if error.errno not in (EACCES, EAGAIN):
+            why = f"its file system cannot lock a file ({error.strerror}): use a folder on another one"
+            raise StoreError(f"{path.parent}: {why}") from None
         raise StoreError(f"{path.parent}: another run writes to it ({by}): wait for it, or use another --out") from None
     os.ftruncate(lock, 0)
     os.write(lock, f"process {os.getpid()} on {socket.gethostname()} since {now()}\n".encode())

@@ -38,6 +38,7 @@ _LOOK_EVERY = 0.2  # s, at the workers
 _MOST_RESTARTS = 3  # of the workers, with no flight done in between
 _MOST_TASKS = 64  # in a chunk
 _PIPE = 48_000  # bytes of waiting messages: a full pipe blocks this process, for ever if all workers are dead
+OUT_OF_MEMORY = "the machine had too little memory for it"
 _NONE = -1  # no flight of the chunk has begun
 _NOT_IN_FLIGHT = -1.0  # for the simulated time, before a flight's first row and after its last
 _NOTES = 3  # numbers that a worker notes: which flight of its chunk, the simulated time in s, its process
@@ -77,11 +78,13 @@ Fly = Callable[[Task, Path], WorkerResult]
 
 def fly_task(task: Task, folder: Path) -> WorkerResult:
     """Flies a task, in a worker, and writes its recording if the task asks for one."""
-    begin = time.perf_counter()
-    log = simulate_safely(task.flight, _note)
-    _note(_NOT_IN_FLIGHT)
-    result = result_of(log, time.perf_counter() - begin)
-    problem = ""
+    begin, problem = time.perf_counter(), ""
+    try:
+        log = simulate_safely(task.flight, _note)
+        _note(_NOT_IN_FLIGHT)
+        result = result_of(log, time.perf_counter() - begin)
+    except MemoryError:
+        return WorkerResult(failed_result(Outcome.WORKER_DIED, OUT_OF_MEMORY), version_of(task.flight).number)
     if wanted(task.record, log.outcome):
         problem = record(log, task.key, folder)
     return WorkerResult(result, version_of(task.flight).number, problem)
