@@ -36,6 +36,11 @@ STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
 _PLANTS = Path(__file__).parent
 _INNER_LOOP = Path(autopilot.__file__).parent
+_LOOP = "inner_loop"  # as a model names it
+_SECTIONS = (  # of a model; not the others of JSBSim: output, input, child
+    "fileheader", "metrics", "mass_balance", "ground_reactions", "propulsion", "system", "autopilot", "flight_control",
+    "aerodynamics", "external_reactions", "buoyant_forces",
+)  # fmt: skip
 _PROPERTY = re.compile(r"(?<![\w/])[a-z][\w-]*(?:/[\w-]+)+")
 _AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
 
@@ -68,10 +73,35 @@ class ModelError(PlantError):
         super().__init__("aircraft", message)
 
 
-def _properties(airframe: Path) -> list[str]:
+def _parsed(model: Path) -> ElementTree.Element:
+    """The root of a model, which reads no other file but the inner loop and writes none. Raises `ModelError`.
+
+    JSBSim would write any file that a model names, and open sockets; and what a model includes is in no flight's key.
+    """
+    try:
+        if not model.is_file():
+            raise ModelError(f"{model}: must be a file")
+        root = ElementTree.parse(model).getroot()
+    except OSError as error:
+        raise ModelError(f"{model}: {error.strerror}") from None
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two of an encoding
+        raise ModelError(f"{model}: {error}") from None
+    for section in root:
+        if section.tag not in _SECTIONS:
+            raise ModelError(f"{model}: <{section.tag}> is not read, only {', '.join(_SECTIONS)}")
+    for element in root.iter():
+        if (file := element.get("file")) is not None and (element.tag, file) != ("system", _LOOP):
+            raise ModelError(f'{model}: <{element.tag} file="{file}"> is not read, only <system file="{_LOOP}">')
+    for loop in (model.with_name(f"{_LOOP}.xml"), model.parent / "Systems" / f"{_LOOP}.xml"):
+        if os.path.lexists(loop):
+            raise ModelError(f"{loop}: JSBSim would read it instead of the inner loop of the harness: move it away")
+    return root
+
+
+def _properties(model: ElementTree.Element) -> list[str]:
     """The names of all properties that the model and its inner loop read."""
-    files = (aircraft.model(airframe), _INNER_LOOP / "inner_loop.xml")
-    texts = (text for file in files for text in ElementTree.parse(file).getroot().itertext())
+    roots = (model, ElementTree.parse(_INNER_LOOP / f"{_LOOP}.xml").getroot())
+    texts = (text for root in roots for text in root.itertext())
     return sorted({name for text in texts for name in _PROPERTY.findall(text)})
 
 
@@ -92,12 +122,9 @@ def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> jsbsim.FGF
     with TemporaryDirectory(prefix="harness-") as folder:
         copy = Path(folder) / airframe.name
         copy.mkdir()
-        try:
-            tree = ElementTree.parse(aircraft.model(airframe))
-        except (OSError, ElementTree.ParseError) as error:
-            raise ModelError(f"{aircraft.model(airframe)}: {error}") from None
-        _alter(tree.getroot(), errors)
-        tree.write(aircraft.model(copy), encoding="utf-8")
+        model = _parsed(aircraft.model(airframe))
+        _alter(model, errors)
+        ElementTree.ElementTree(model).write(aircraft.model(copy), encoding="utf-8")
         return _load(copy, step)
 
 
@@ -131,6 +158,7 @@ def _alter(model: ElementTree.Element, errors: Errors) -> None:
 
 
 def _load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
+    model = _parsed(aircraft.model(airframe))
     _load_log.problems.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_dt(step)  # before the model: its components keep the step they were made with
@@ -142,7 +170,7 @@ def _load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
         raise ModelError(f"{aircraft.model(airframe)}: {' '.join(str(error).split())}") from error
     if not loaded or _load_log.problems:
         raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
-    missing = [name for name in _properties(airframe) if not fdm.get_property_manager().hasNode(name)]
+    missing = [name for name in _properties(model) if not fdm.get_property_manager().hasNode(name)]
     if missing:
         for name in missing:  # JSBSim ends the whole process when it reads, or merely drops, an unknown property
             fdm[name] = 0.0

@@ -1,0 +1,151 @@
+"""What somebody else wrote: a journal or an airframe's folder runs nothing and writes nothing that nobody asked for."""
+
+import json
+import shutil
+import sqlite3
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import harness
+from harness.files import content_hash
+from harness.runs.store import JOURNAL
+from tests.builders import copied_airframe, fly_matrix, write
+from tests.confined import Confined, Ended
+
+TEMPORARY = "standoff-harness-"  # begins the name of what a command removes when its process ends
+
+SIXDOF = """\
+title = "A title"
+question = "A question?"
+[flight]
+plant = "sixdof"
+duration_s = 1.0
+[flight.law]
+name = "nftsm"
+[matrix]
+plant = ["kinematic", "sixdof"]
+seed = [0, 1]
+"""
+
+
+@pytest.fixture(scope="module")
+def confined(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Confined]:
+    with Confined(tmp_path_factory.mktemp("confined")) as process:
+        yield process
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run with a 6-DOF flight."""
+    folder = tmp_path_factory.mktemp("flown")
+    fly_matrix(write(folder / "matrix.toml", SIXDOF), folder / "run")
+    return folder / "run"
+
+
+def foreign(
+    flown: Path,
+    folder: Path,
+    settings: Callable[[dict[str, Any]], None] = lambda settings: None,
+    model: str = "",
+) -> str:
+    """A copy of the run as `folder`/run, with one 6-DOF row changed; `model` ends its airframe's model. Its key."""
+    (folder / "run").mkdir(parents=True)
+    shutil.copy(flown / JOURNAL, folder / "run")
+    journal = sqlite3.connect(folder / "run" / JOURNAL)
+    (key, text, version) = journal.execute(
+        "SELECT key, settings, version FROM flights WHERE json_extract(settings, '$.plant') = 'sixdof'"
+    ).fetchone()
+    row = json.loads(text)
+    settings(row)
+    journal.execute("UPDATE flights SET settings = ? WHERE key = ?", (json.dumps(row), key))
+    if model:
+        (decides,) = journal.execute("SELECT decides FROM versions WHERE id = ?", (version,)).fetchone()
+        content = json.loads(decides)["content"]
+        (before,) = journal.execute("SELECT content FROM files WHERE hash = ?", (content["aircraft/model"],)).fetchone()
+        changed = before.replace(b"</fdm_config>", f"{model}</fdm_config>".encode())
+        decides = decides.replace(content["aircraft/model"], content_hash(changed))
+        journal.execute("INSERT INTO files VALUES (?, ?)", (content_hash(changed), changed))
+        journal.execute("UPDATE versions SET decides = ? WHERE id = ?", (decides, version))
+    journal.commit()
+    journal.close()
+    return str(key)
+
+
+def every_command(confined: Confined, key: str, folder: Path) -> dict[str, Ended]:
+    """How each command that reads a journal ends, by its name; none writes elsewhere than to `out` and the journal."""
+    (folder / "out").mkdir()
+    calls = {
+        "fly": f"fly run:{key} --rrd out/fly.rrd",
+        "show": f"show run:{key}",
+        "show all": "show run",
+        "view": f"view run:{key} --save out/view.rrd",
+        "plot": f"plot run:{key} --what track --save out/track.svg",
+        "compare": "compare run",
+        "report": "report run --out out/report.html",
+        "export": f"export run:{key} --to csv --out out/flight.csv",
+        "export all": "export run --to csv --out out/table.csv",
+    }
+    ended = {}
+    for name, words in calls.items():
+        ended[name] = confined.run(words.split(), folder)
+        assert "Traceback" not in ended[name].stderr, (name, ended[name].stderr)
+        assert ended[name].code in (0, 1, 2), (name, ended[name])
+    assert {path.name for path in folder.iterdir() if not path.name.startswith(TEMPORARY)} == {"run", "out"}
+    return ended
+
+
+def told(ended: Ended) -> str:
+    """The one line that a command refused with."""
+    assert ended.code == 2, ended
+    (line,) = ended.stderr.splitlines()
+    return line
+
+
+@pytest.mark.parametrize(
+    ("section", "name"),
+    [
+        ('<output name="{folder}/written.csv" type="CSV" rate="10"><position>ON</position></output>', "output"),
+        ('<output name="127.0.0.1" type="SOCKET" port="9" rate="10"><position>ON</position></output>', "output"),
+        ('<output file="{folder}/output.xml"/>', "output"),
+        ('<input port="0"/>', "input"),
+        ('<input type="QTJSBSIM" port="0"/>', "input"),
+        ('<child name="ultra_stick_25e"/>', "child"),
+        ('<system file="{folder}/system.xml"/>', 'system file="{folder}/system.xml"'),
+        ('<propulsion><engine file="/dev/zero"/></propulsion>', 'engine file="/dev/zero"'),
+    ],
+)
+def test_a_model_that_would_write_or_read_another_file_or_open_a_socket_is_refused(
+    flown: Path, tmp_path: Path, confined: Confined, section: str, name: str
+) -> None:
+    section, name = (text.replace("{folder}", str(tmp_path / "elsewhere")) for text in (section, name))
+    key = foreign(flown, tmp_path / "here", model=section)
+    ended = confined.run(["fly", f"run:{key}"], tmp_path / "here")
+    assert f"<{name}> is not read, only " in told(ended)
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_no_command_runs_a_model_that_would_write_a_file(flown: Path, tmp_path: Path, confined: Confined) -> None:
+    file = tmp_path / "written.csv"
+    key = foreign(flown, tmp_path / "here", model=f'<output name="{file}" type="CSV" rate="10"/>')
+    ended = every_command(confined, key, tmp_path / "here")
+    for command in ("fly", "view", "plot", "export"):
+        assert "<output> is not read, only " in told(ended[command])
+    for command in ("show", "show all", "compare", "report", "export all"):
+        assert ended[command].code == 0
+    assert not file.exists()
+
+
+def test_an_inner_loop_in_the_folder_of_an_airframe_is_refused(tmp_path: Path, confined: Confined) -> None:
+    airframe = copied_airframe("aerosonde", tmp_path / "mine")
+    loop = Path(harness.__file__).parents[1] / "autopilot" / "inner_loop.xml"
+    file = write(
+        tmp_path / "one.toml", SIXDOF.partition("[matrix]")[0].replace("[flight]", '[flight]\naircraft="mine"')
+    )
+    assert confined.run(["fly", str(file)], tmp_path).code == 0
+    shutil.copy(loop, airframe)
+    assert "JSBSim would read it instead of the inner loop of the harness" in told(
+        confined.run(["fly", str(file)], tmp_path)
+    )
