@@ -367,3 +367,15 @@ def test_messages_show_values_as_a_file_has_them(write: Write) -> None:
     assert [line.split(": ", 2)[2].split(", must")[0] for line in mistakes(write(text))] == [
         "is 2020-01-01", "is [07:32:00, true]", 'is { a = inf, b = "x" }',
     ]  # fmt: skip
+
+
+def test_another_law_leaves_out_the_gains_that_the_file_gives_for_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    own = 'name = "nftsm"\ngains = "paper_1"\nk2 = 3.0\nstandoff_m = 150.0\n'
+    file.write_text(f'[flight]\nplant = "kinematic"\n[flight.law]\n{own}')
+    with pytest.warns(UserWarning, match=r"law\.name=smc: leaves out gains, k2 of nftsm in .*a\.toml"):
+        flight = load_flight(file, ["law.name=smc", "law.c1=0.3"])
+    assert flight.law == law("smc", "paper", c1=0.3, standoff=150.0)
+    assert load_flight(file, ["law.name=nftsm"]) == load_flight(file)
+    with pytest.warns(UserWarning, match="leaves out"), pytest.raises(SettingsError, match=r"law\.alpha2"):
+        load_flight(file, ["law.name=smc", "law.alpha2=1"])

@@ -13,6 +13,7 @@ from typing import Any
 import aircraft
 from autopilot.laws import LAWS
 from autopilot.rules import RuleError
+from autopilot.standoff import StandoffLaw
 from harness.checks import problems, start_problems
 from harness.error import SettingsError
 from harness.files import file_name
@@ -161,7 +162,31 @@ def overridden(file: SettingsFile, overrides: Sequence[str], option: str = "--se
     if wrong:
         raise SettingsError(wrong)
     changed = replace(file, document=document, overrides=merged)
+    _leave_out_gains_of_another_law(file.document, changed)
     return replace(changed, document=without_former_names(document, changed.warn))
+
+
+def _leave_out_gains_of_another_law(before: Mapping[str, Any], changed: SettingsFile) -> None:
+    """Where an override names another law, what the file gives for its own law's gains is left out, with a warning."""
+    former, law = (_within(_within(document, "flight"), "law") for document in (before, changed.document))
+    if ("flight", "law", "name") not in changed.overrides or former.get("name") in (None, law["name"]):
+        return
+    names = law["name"] if isinstance(law["name"], list) else [law["name"]]
+    if not all(isinstance(name, str) and (name in LAWS or ":" in name) for name in names):
+        return  # a mistake, which the check tells
+    shared = {"name", *schema_of(StandoffLaw).settings}
+    left_out = [key for key in law if key not in shared and ("flight", "law", key) not in changed.overrides]
+    for key in left_out:
+        del law[key]
+    if left_out:
+        override = changed.overrides["flight", "law", "name"]
+        what = f"{', '.join(left_out)} of {former['name']} in {changed.path}"
+        warnings.warn(f"{override}: leaves out {what}, which are another law's", stacklevel=3)
+
+
+def _within(document: Mapping[str, Any], name: str) -> dict[str, Any]:
+    table = document.get(name)
+    return table if isinstance(table, dict) else {}
 
 
 def flight_from_document(document: Mapping[str, object], folder: Path = Path(), *, run: bool = False) -> Flight:
