@@ -91,8 +91,13 @@ def _airframes(folder: Path) -> None:
     copied_airframe("aerosonde", folder / "mine")
 
 
+def _laws(folder: Path) -> None:
+    assert invoke("init", "--law", folder / "mine.py").exit_code == 0
+
+
 THINGS: Mapping[str, Callable[[Path], None]] = {
-    "FILE": _settings, "MATRIX": _matrices, "TRACK": _tracks, "RUN": _runs, "RRD": _recordings, "AIRFRAME": _airframes
+    "FILE": _settings, "MATRIX": _matrices, "TRACK": _tracks, "RUN": _runs, "RRD": _recordings, "AIRFRAME": _airframes,
+    "LAW": _laws,
 }  # fmt: skip
 
 # Calls, in which words in capitals stand for something
@@ -103,10 +108,11 @@ CALLS: Mapping[str, Sequence[str]] = {
     "fly": [
         f"FILE {SHORT} --set SET", f"FILE {SHORT} {TRACKED} --json",
         f"FILE {SHORT} --set aircraft=AIRFRAME --rrd OUT/a", f"FILE {SHORT} --against RUN:KEY",
-        f"RUN:KEY {SHORT} --set SET", "RUN:KEY", "WORD",
+        f"RUN:KEY {SHORT} --set SET", "RUN:KEY", "WORD", f"FILE {SHORT} --set law.name=LAW:MyLaw --set law.gains=firm",
     ],
     "check": [
         "FILE", "FILE --set SET", "MATRIX --set SET", f"FILE {TRACKED}", "FILE --set aircraft=AIRFRAME", "WORD",
+        "LAW", "LAW:MyLaw", "LAW:WORD",
     ],
     "predict": ["FILE --set SET", "FILE --set aircraft=AIRFRAME", "FILE --set WORD"],
     "view": [
@@ -121,7 +127,7 @@ CALLS: Mapping[str, Sequence[str]] = {
         "RRD --to csv --out OUT/a", "RRD --to parquet --out OUT/a --flight WORD", "RUN:KEY --to csv --out OUT/a",
         "RUN --to csv --out OUT/a", "RUN --to parquet --out OUT/a",
     ],
-    "init": ["OUT/a.toml", "FILE", "OUT/WORD"],
+    "init": ["OUT/a.toml", "FILE", "OUT/WORD", "--law OUT/a.py", "--law LAW"],
     "run": [
         "MATRIX --dry-run", "FILE --dry-run --set SET", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --set SET",
         f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 {TRACKED}",

@@ -14,7 +14,7 @@ from harness.log.signals import at_limit
 from harness.plants.plant import Outcome
 from harness.settings import SettingsError, document, flight_from_document
 from harness.settings.laws import entries
-from tests.builders import EXPERIMENTS, fly_matrix, invoke, write
+from tests.builders import EXPERIMENTS, command, fly_matrix, invoke, write
 
 PLAIN = '''
 from dataclasses import dataclass
@@ -368,3 +368,31 @@ def test_laws_of_one_file_name_in_two_folders_are_told_apart_and_compared(own: P
     compared = invoke("compare", "out")
     assert compared.exit_code == 0, compared.output
     assert f"law.name = {other}/field.py:Field beside {own.parent}/field.py:Field" in compared.output
+
+
+def test_every_command_flies_a_law_of_ones_own(tmp_path: Path) -> None:
+    """On the real command line: each command is a process of its own, that knows the law by its file alone."""
+    law = ("--set", f"law.name={tmp_path / 'mine.py'}:MyLaw", "--set", "law.gains=firm", "--set", "duration_s=40")
+    file, out = EXPERIMENTS / "stationary.toml", tmp_path / "out"
+
+    def told(*words: object) -> str:
+        done = command(*words)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    told("init", "--law", tmp_path / "mine.py")
+    assert "law mine.py:MyLaw with gains firm" in told("fly", file, *law)
+    matrix = write(
+        tmp_path / "m.toml",
+        '[flight]\nduration_s = 40.0\nlaw.name = "mine.py:MyLaw"\n[matrix]\nplant = ["kinematic", "lagged"]\n'
+        '"law.gains" = ["gentle", "firm"]\n',
+    )
+    assert "4 flown, 0 earlier, 0 failed" in told("run", matrix, "--out", out, "--workers", 2, "--log", "none")
+    assert "margin to the limit cycle" in told("compare", out)
+    key = harness.load_results(out)["key"][0]
+    told("view", f"{out}:{key}", "--save", tmp_path / "a.rrd")
+    told("view", out, "--pair", key, "--save", tmp_path / "pair.rrd")
+    assert "margin to the limit cycle" in told("predict", file, *law)
+    searched = ("--over", "law.k=0.2:4", "--minimise", "convergence_time_s", "--flights", 4, "--workers", 1)
+    told("tune", file, *law, "--set", "plant=kinematic", *searched, "--out", tmp_path / "tuned")
+    assert "law mine.py:MyLaw" in told("fly", tmp_path / "tuned" / "best.toml")

@@ -17,8 +17,9 @@ from harness.requirement import requirement
 from harness.runs.run import Options
 from harness.search.dimension import Dimension, dimension
 from harness.search.files import TRIALS
+from harness.search.sampler import Sampler
 from harness.search.space import Space
-from harness.search.tune import Tuning, tuning
+from harness.search.tune import AT_ONCE, Tuning, tuning
 from harness.settings import document, load_flight, read_settings
 from harness.settings.written import toml
 from harness.world.target import Segment, Target
@@ -230,3 +231,9 @@ def test_a_written_flight_is_read_back_as_it_was(tmp_path: Path) -> None:
         Flight(plant="sixdof", law=FLIGHT.law, wind=wind, target=Target(speed=3.0, segments=segments)),
     ):
         assert load_flight(write(tmp_path / "flight.toml", toml(flight))) == flight
+
+
+def test_a_search_of_one_setting_asks_for_a_whole_batch_before_it_is_told() -> None:
+    sampler = Sampler([dimension("law.k2=1:9")], 1, 0)
+    asked = [sampler.ask() for _ in range(AT_ONCE)]
+    assert len({ask.values["law.k2"] for ask in asked}) == AT_ONCE

@@ -54,7 +54,8 @@ class Sampler:
         """The settings of a trial, to be told later."""
         met = sum(bool(goals) for goals in self._reached)
         out = sum(map(math.isnan, self._off))
-        spread = met + out < self._first and len(self._at) < 4 * self._first
+        told = len(self._off) - out
+        spread = not told or (met + out < self._first and len(self._at) < 4 * self._first)
         values = self._values(self._spread.random(1)[0] if spread else self._most_promising())
         self._at.append(np.array([d.share(values[d.key]) for d in self._dimensions]))
         self._off.append(math.nan)
