@@ -101,7 +101,8 @@ def _strongest(x: Array, period: float, slowest: float) -> float:
 def _amplitude(x: Array, cycle: float) -> float:
     """Half of peak to peak, the mean over the cycles of so many samples."""
     count = max(2, round(cycle))
-    return float(np.mean([np.ptp(x[i : i + count]) for i in range(0, len(x) - count + 1, count)])) / 2.0
+    whole = x[: len(x) // count * count].reshape(-1, count)
+    return float(np.ptp(whole, axis=1).mean()) / 2.0
 
 
 def _correlation(x: Array, lag: int) -> float:
