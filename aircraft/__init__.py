@@ -93,7 +93,11 @@ def _numbers(file: Path) -> Callable[..., float]:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
+        if file.exists() and not file.is_file():
+            raise AirframeError(f"{file}: must be a file")
         return _parsed(file.read_text(encoding="utf-8"))
+    except AirframeError:
+        raise
     except OSError as error:
         raise AirframeError(f"{file}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

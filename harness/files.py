@@ -1,11 +1,18 @@
-"""Writing a file completely or not at all, names of files as text, and the hash of a content."""
+"""Reading files that have an end, writing them completely or not at all, their names as text, and a content's hash."""
 
 import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from errno import ENOENT
+from errno import EINVAL, ENOENT
 from pathlib import Path
+
+
+def read(path: Path) -> bytes:
+    """The content of a file. Raises OSError, also for a pipe or a device: reading that may never end."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(EINVAL, "is a pipe or a device, must be a file", str(path))
+    return path.read_bytes()
 
 
 @contextmanager

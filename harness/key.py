@@ -12,7 +12,7 @@ import aircraft
 import autopilot
 from autopilot.estimator import ESTIMATORS
 from autopilot.guidance import uses_response
-from harness.files import content_hash
+from harness.files import content_hash, read
 from harness.flight import Flight
 from harness.plants.ladder import PLANTS, identification_files
 from harness.settings import document
@@ -54,7 +54,7 @@ def _of_folder(airframe: str) -> dict[str, str]:
     """What a folder with an airframe is known by, wherever it lies; by its name alone where it is gone."""
     try:
         folder = aircraft.folder(airframe)
-        return {"name": folder.name, "data": content_hash((folder / "airframe.toml").read_bytes())}
+        return {"name": folder.name, "data": content_hash(read(folder / "airframe.toml"))}
     except OSError:
         return {"name": Path(airframe).name}
 
@@ -117,7 +117,7 @@ def hashed(content: object) -> str:
 
 
 def _hashes(files: Mapping[str, Path]) -> dict[str, str]:
-    return {name: content_hash(path.read_bytes()) for name, path in files.items()}
+    return {name: content_hash(read(path)) for name, path in files.items()}
 
 
 # The laws and estimators as imported: what this process flies, whatever the files are edited to later.

@@ -1,6 +1,7 @@
 """What somebody else wrote: a journal or an airframe's folder runs nothing and writes nothing that nobody asked for."""
 
 import json
+import os
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -136,6 +137,60 @@ def test_no_command_runs_a_model_that_would_write_a_file(flown: Path, tmp_path: 
     for command in ("show", "show all", "compare", "report", "export all"):
         assert ended[command].code == 0
     assert not file.exists()
+
+
+@pytest.mark.parametrize("how", ["device", "pipe"])
+def test_a_track_that_is_no_file_is_refused(how: str, flown: Path, tmp_path: Path, confined: Confined) -> None:
+    track = Path("/dev/zero")
+    if how == "pipe":
+        os.mkfifo(track := tmp_path / "pipe")
+    key = foreign(flown, tmp_path / "here", lambda row: row["target"].update(track=str(track)))
+    ended = every_command(confined, key, tmp_path / "here")
+    for command in ("fly", "view", "plot", "export"):
+        assert f"{track}: is a pipe or a device, must be a file" in told(ended[command])
+    for command in ("show", "show all", "compare", "report", "export all"):
+        assert ended[command].code == 0
+    file = write(tmp_path / "one.toml", SIXDOF.partition("[matrix]")[0])
+    for words in (["fly"], ["check"], ["run", "--out", "out"]):
+        refused = told(confined.run([*words, str(file), "--set", f"target.track={track}"], tmp_path))
+        assert f"{track}: is a pipe or a device, must be a file" in refused
+
+
+@pytest.mark.parametrize("name", ["airframe.toml", "inner_loop.toml", "identified.toml", "mine.xml"])
+def test_a_file_of_an_airframe_that_is_a_pipe_is_refused(name: str, tmp_path: Path, confined: Confined) -> None:
+    airframe = copied_airframe("aerosonde", tmp_path / "mine")
+    (airframe / name).unlink()
+    os.mkfifo(airframe / name)
+    text = SIXDOF.partition("[matrix]")[0].replace("[flight]", '[flight]\naircraft = "mine"')
+    plant = "lagged" if name == "identified.toml" else "sixdof"
+    assert "mine" in told(
+        confined.run(["fly", str(write(tmp_path / "one.toml", text)), "--set", f"plant={plant}"], tmp_path)
+    )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fly",
+        "check",
+        "run --out out",
+        "show",
+        "compare",
+        "plot --save out/a.svg",
+        "view --save out/a.rrd",
+        "export --to csv --out out/a",
+    ],
+)
+def test_a_device_is_no_settings_file_and_no_recording(words: str, tmp_path: Path, confined: Confined) -> None:
+    (tmp_path / "out").mkdir()
+    command, *more = words.split()
+    assert told(confined.run([command, "/dev/zero", *more], tmp_path)).startswith("/dev/zero: ")
+
+
+def test_a_table_of_results_that_is_a_pipe_is_not_read(flown: Path, tmp_path: Path, confined: Confined) -> None:
+    key = foreign(flown, tmp_path)
+    os.mkfifo(tmp_path / "run" / "flights.parquet")
+    assert {ended.code for ended in every_command(confined, key, tmp_path).values()} == {0}
 
 
 def test_an_inner_loop_in_the_folder_of_an_airframe_is_refused(tmp_path: Path, confined: Confined) -> None:

@@ -8,6 +8,8 @@ the zeros between two texts. The checksum takes its place, and is that of the wh
 import hashlib
 from pathlib import Path
 
+from harness.files import read
+
 _MARK = b"CHECKSUM:"
 _NONE = b"~!@#$%^&*+=|?<>{}[]()ZXQJVKWYGRP"  # as long as a checksum, and none
 PLACEHOLDER = _MARK + _NONE
@@ -26,7 +28,7 @@ def check(path: Path) -> None:
 
     Recordings of earlier versions have no seal.
     """
-    content = path.read_bytes()
+    content = read(path)
     before, mark, after = content.partition(_MARK)
     if not mark:
         return

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import aircraft
-from harness.files import content_hash
+from harness.files import content_hash, read
 from harness.flight import Flight
 from harness.key import version_of
 from harness.log import FlightLog
@@ -193,6 +193,6 @@ def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Pa
 
 def _hash(path: Path) -> str | None:
     try:
-        return content_hash(path.read_bytes())
+        return content_hash(read(path))
     except OSError:
         return None

@@ -70,6 +70,8 @@ def _is_current(path: Path, now: str) -> bool:
     import pyarrow.parquet as pq
 
     try:
+        if not path.is_file():
+            return False
         with path.open("rb") as file:  # Arrow takes a colon in a name for a scheme
             return (pq.read_schema(file).metadata or {}).get(_STATE) == now.encode()
     except (OSError, pa.ArrowException):
@@ -82,8 +84,10 @@ def _exported(path: Path, now: str) -> "pa.Table | None":
     import pyarrow.parquet as pq
 
     try:
+        if not _is_current(path, now):
+            return None
         with path.open("rb") as file:
-            return pq.read_table(file) if _is_current(path, now) else None
+            return pq.read_table(file)
     except (OSError, pa.ArrowException):
         return None
 

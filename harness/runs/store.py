@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from harness.error import HarnessError
-from harness.files import as_text, content_hash, make_folder
+from harness.files import as_text, content_hash, make_folder, read
 from harness.key import Version
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
@@ -129,7 +129,7 @@ class Store:
         hashes = version.decides["content"]
         for name, path in files.items():
             try:
-                content = path.read_bytes()
+                content = read(path)
             except OSError as error:
                 raise StoreError(f"{path}: {error.strerror or error}, during the run") from None
             if content_hash(content) != hashes[name]:

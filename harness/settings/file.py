@@ -32,6 +32,8 @@ from harness.settings.table import TableSchema, schema_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
 from harness.toml_text import shortened, tables_of, value_of
 
+_LARGEST = 1 << 24  # bytes
+
 
 @dataclass(frozen=True, slots=True)
 class SettingsFile:
@@ -200,7 +202,11 @@ def flight_from_document(document: Mapping[str, object], folder: Path = Path(), 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        with path.open("rb") as file:  # may be a pipe; from a device it would never end
+            content = file.read(_LARGEST + 1)
+        if len(content) > _LARGEST:
+            raise SettingsError([f"{path}: has more than {_LARGEST >> 20} MB, which no settings file has"])
+        return content.decode("utf-8-sig")
     except OSError as error:
         raise SettingsError([f"{path}: {error.strerror or error}"]) from None
     except UnicodeDecodeError as error:

@@ -21,7 +21,7 @@ from typing import Any, Literal, NamedTuple, get_origin
 from autopilot.guidance import Law
 from autopilot.laws import LAWS, LawKind
 from harness.error import SettingsError, did_you_mean
-from harness.files import content_hash
+from harness.files import content_hash, read
 from harness.settings.table import Setting, schema_of
 
 ENTRY_POINTS = "standoff_harness.laws"  # the group by which a package names its laws
@@ -186,7 +186,7 @@ def find(name: str) -> Source:
         main, root, package = _module_file(where)
     files = {_called(path, root): path for path in _closure(main, root, package)}
     try:
-        hashes = {label: content_hash(path.read_bytes()) for label, path in files.items()}
+        hashes = {label: content_hash(read(path)) for label, path in files.items()}
     except OSError as error:
         raise LawError(f"{error.filename}: {error.strerror}") from None
     return Source(name, where, class_name, main, root, MappingProxyType(files), MappingProxyType(hashes))

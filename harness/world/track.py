@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from harness.error import HarnessError
+from harness.files import read
 
 HEADER = ("time_s", "north_m", "east_m")
 FEWEST = 4  # rows: as many as determine a cubic
@@ -62,9 +63,7 @@ class Track:
 def load_track(path: Path) -> Track:
     """The track in a file. Raises `TrackError`."""
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            raise TrackError(f"{path}: is a pipe or a device, must be a file: it is read more than once")
-        return _parsed(path, path.read_bytes())
+        return _parsed(path, read(path))
     except TrackError:
         raise
     except OSError as error:
