@@ -1,6 +1,8 @@
 """A law of one's own, named by its file or module: flown, kept, and never run because somebody else's file names it."""
 
 import math
+import os
+import time
 from pathlib import Path
 
 import numpy as np
@@ -396,3 +398,38 @@ def test_every_command_flies_a_law_of_ones_own(tmp_path: Path) -> None:
     searched = ("--over", "law.k=0.2:4", "--minimise", "convergence_time_s", "--flights", 4, "--workers", 1)
     told("tune", file, *law, "--set", "plant=kinematic", *searched, "--out", tmp_path / "tuned")
     assert "law mine.py:MyLaw" in told("fly", tmp_path / "tuned" / "best.toml")
+
+
+@pytest.mark.parametrize(
+    ("start", "outcome", "reason"),
+    [
+        ("1 / 0", "the law cannot start: ZeroDivisionError", "the law raised ZeroDivisionError"),
+        ("lambda o: Guidance(o.time * float('nan'), 0, 0, 0, 0, 0)", "the law commanded nan", "not finite"),
+    ],
+)
+def test_a_law_that_fails_is_told_by_fly_run_and_predict(tmp_path: Path, start: str, outcome: str, reason: str) -> None:
+    body = f"\n    def start(self, context): return {start}\n    def broken_conditions(self, ratio): return []\n"
+    words = (
+        EXPERIMENTS / "stationary.toml",
+        "--set",
+        f"law.name={law_in(tmp_path, body)}:Own",
+        "--set",
+        "law.gains=custom",
+    )
+    flown = invoke("fly", *words)
+    assert flown.exit_code == 1
+    assert f"outcome: invalid: {outcome}" in flown.output
+    ran = invoke("run", *words, "--out", tmp_path / "out", "--workers", 0, "--log", "all")
+    assert "1 flown, 0 earlier, 1 failed" in ran.output
+    assert outcome in harness.load_results(tmp_path / "out")["reason"][0]
+    assert reason in invoke("predict", *words).output
+
+
+def test_a_file_is_read_again_when_it_has_changed(tmp_path: Path) -> None:
+    law = f"{law_in(tmp_path, WHOLE.format(answer='0.1'))}:Own"
+    before = time.time_ns() - 10**9
+    os.utime(tmp_path / "own.py", ns=(before, before))
+    assert harness.law(law) == harness.law(law)
+    law_in(tmp_path, WHOLE.format(answer="0.2"))  # of the same size
+    flight = harness.Flight(plant="kinematic", law=harness.law(law), duration=1.0)
+    assert harness.simulate(flight)["heading_rate_command"][0] == 0.2

@@ -31,6 +31,8 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
     from harness.feasibility import feasibility_line, warnings
     from harness.runs.matrix import read_matrix
     from harness.settings import SettingsError
+    from harness.settings.laws import source_of
+    from harness.settings.tried import slowness
 
     if file.suffix == ".py" or ".py:" in file.name:
         if overrides:
@@ -49,7 +51,7 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
         (combination,) = matrix.combinations()
         flight = flight_of(matrix.located(combination))
         click.echo(feasibility_line(flight))
-        for warning in warnings(flight, of_circle=False):
+        for warning in [*warnings(flight, of_circle=False), *(slowness(flight) if source_of(flight.law) else ())]:
             click.echo(f"warning: {warning}", err=True)
     click.echo(f"{file}: ok")
 

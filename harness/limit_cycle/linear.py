@@ -10,7 +10,7 @@ import numpy as np
 from autopilot.linear import Array, Linear
 from autopilot.response import held
 from harness.chatter import VISIBLE
-from harness.limit_cycle.prediction import Crossover, Loop
+from harness.limit_cycle.prediction import Crossover, LawFailed, Loop
 
 NO_LINEARISATION = "the law has memory, and no method `linearised` that says what it does to a small oscillation"
 _TRIED = 7  # points at which a law is asked twice
@@ -19,7 +19,10 @@ _TRIED = 7  # points at which a law is asked twice
 def linearised(loop: Loop) -> Linear | None:
     """The loop's law from (heading error, range error) to its command, as it gives it; None where it gives none."""
     own: Callable[[Any, float], Linear] | None = getattr(loop.law, "linearised", None)
-    return own(loop.context, VISIBLE) if own else None
+    try:
+        return own(loop.context, VISIBLE) if own else None
+    except Exception as error:
+        raise LawFailed(f"the law's linearised raised {type(error).__name__}: {error}") from error
 
 
 def has_memory(loop: Loop) -> bool:

@@ -15,7 +15,7 @@ from autopilot.guidance import Law
 from autopilot.response import critical_gain
 from harness.flight import Flight
 from harness.limit_cycle.linear import NO_LINEARISATION, crossing_and_margin, has_memory, linearised
-from harness.limit_cycle.prediction import Crossover, LimitCycle, Loop, boundary, crossover, limit_cycle
+from harness.limit_cycle.prediction import Crossover, LawFailed, LimitCycle, Loop, boundary, crossover, limit_cycle
 from harness.plants.identified import IdentifiedError, Sweep, identified
 
 # 1.5 is 3.5 dB. MIL-F-9490D asks 6 dB, a factor of 2, and 45 deg of a flight control system, of what its model leaves
@@ -68,7 +68,10 @@ def following_of(law: Law, airframe: Path, airspeed: float, period: float) -> Fo
         found = identified(airframe, airspeed)
     except IdentifiedError as error:
         return Following(reason=str(error))
-    return _following(Loop(law, found.heading_rate, airspeed, period), found.sweep)
+    try:
+        return _following(Loop(law, found.heading_rate, airspeed, period), found.sweep)
+    except LawFailed as error:
+        return Following(reason=str(error))
 
 
 @lru_cache(maxsize=4096)
@@ -96,7 +99,10 @@ def margin_of(flight: Flight) -> float | None:
     except IdentifiedError:
         return None
     loop = Loop(flight.law, found.heading_rate, flight.start.airspeed, flight.guidance_period)
-    return None if _why_unknown(loop) else _known(_judged(loop)[1])
+    try:
+        return None if _why_unknown(loop) else _known(_judged(loop)[1])
+    except LawFailed:
+        return None
 
 
 @lru_cache(maxsize=4096)

@@ -35,6 +35,10 @@ _SOLVED = 1e-6  # the largest imbalance of a solution, relative to the first har
 _UNKNOWN = (math.nan, math.nan, math.nan)  # heading rate, bank, roll rate: unknown here
 
 
+class LawFailed(ValueError):  # noqa: N818 - it says what happened
+    """The law of a loop failed where it was asked; the message says how."""
+
+
 class LimitCycle(NamedTuple):
     """A limit cycle on the circle. SI, rad; an amplitude is half of peak to peak."""
 
@@ -71,15 +75,16 @@ class Loop:
         return -self.airspeed / self.law.standoff
 
     def commands(self, e: Array, r: Array) -> Array:
-        """The commands of the law, rad/s, at these heading errors, rad, and range errors, m; equal shapes."""
+        """The commands of the law, rad/s, at these heading errors, rad, and range errors, m; equal shapes.
+
+        Raises `LawFailed`.
+        """
         R_d, v_a = self.law.standoff, self.airspeed
 
         def seen(e: float, r: float) -> Observation:
             psi = e - 0.5 * math.pi  # due north of the target, at the origin, the paper's circle goes west
             own = (R_d + r, 0.0, v_a * math.cos(psi), v_a * math.sin(psi), v_a, psi, *_UNKNOWN, v_a)
             return Observation._make((*own, *(0.0,) * 9))
-
-        step = self._in_the_papers_direction(seen(0.0, 0.0))
 
         def command(e: float, r: float) -> float:
             guidance = step(seen(e, r))
@@ -88,7 +93,14 @@ class Loop:
             wanted = self.turn + self.gain * (guidance.unlimited_command - self.turn)
             return float(np.clip(wanted, -self.law.max_heading_rate, self.law.max_heading_rate))
 
-        return np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)])
+        try:
+            step = self._in_the_papers_direction(seen(0.0, 0.0))
+            commands = np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)], np.float64)
+        except Exception as error:
+            raise LawFailed(f"the law raised {type(error).__name__}: {error}") from error
+        if not np.isfinite(commands).all():
+            raise LawFailed("the law commanded what is not finite")
+        return commands
 
     def _in_the_papers_direction(self, on_the_circle: Observation) -> LawStep:
         """The law in flight; one that has no setting for it is turned round if it circles the other way."""

@@ -9,6 +9,8 @@ from harness.flight import Flight
 from harness.runs.matrix import Combination, Matrix
 from harness.runs.wall_time import typical_wall_time
 from harness.settings import SettingsError
+from harness.settings.laws import source_of
+from harness.settings.tried import slowness
 
 _ROW_BYTES = 4500  # in the journal and in flights.parquet
 _RECORDED_BYTES = 450  # per guidance period, in a recording
@@ -114,6 +116,7 @@ class _Seen:
         self._known: dict[str, _FlightSurvey | None] = {}  # None for a flight that has a mistake
         self._seeds: set[object] = set()
         self._wrong = 0  # flights that have a mistake
+        self._slow: dict[type, tuple[str, ...]] = {}  # what there is to tell of the speed of a law of one's own
 
     def get(self, matrix: Matrix, combination: Combination) -> _FlightSurvey:
         """The survey of a flight. Raises `SettingsError` with its mistakes, of flights that are surveyed once."""
@@ -123,7 +126,10 @@ class _Seen:
         if others not in self._known or seed not in self._seeds or (is_alone and self._known[others]):
             self._seeds.add(seed)
             try:
-                self._known[others] = _flight_survey(matrix.flight(combination, started=self._wrong < _MOST_STARTS))
+                flight = matrix.flight(combination, started=self._wrong < _MOST_STARTS)
+                if source_of(flight.law) and type(flight.law) not in self._slow:
+                    self._slow[type(flight.law)] = tuple(slowness(flight))
+                self._known[others] = _flight_survey(flight, self._slow.get(type(flight.law), ()))
             except SettingsError:
                 self._known[others] = None
                 self._wrong += 1
@@ -134,11 +140,11 @@ class _Seen:
         return known
 
 
-def _flight_survey(flight: Flight) -> _FlightSurvey:
+def _flight_survey(flight: Flight, slow: tuple[str, ...]) -> _FlightSurvey:
     errors = flight.errors
     random = flight.estimator.filters or flight.wind.turbulence != "none" or errors.course_noise > 0.0
     body = (flight.aircraft, errors.mass_scale, errors.cg_aft, errors.actuator_lag)
     start = (flight.plant, *body, flight.step, flight.start.airspeed, flight.start.altitude)
     return _FlightSurvey(
-        tuple(warnings(flight)), random, flight.plant, typical_wall_time(flight), flight.periods, start
+        (*warnings(flight), *slow), random, flight.plant, typical_wall_time(flight), flight.periods, start
     )

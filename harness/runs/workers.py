@@ -29,6 +29,7 @@ from harness.runs.own_time import OwnTime
 from harness.runs.recordings import record, wanted
 from harness.runs.row import FlightResult, failed_result, result_of, simulate_safely
 from harness.runs.wall_time import CHUNK, WallTime
+from harness.settings.laws import LawError
 
 AHEAD = 2  # chunks sent out per worker: one is flown, one waits
 TIMEOUT = 60.0  # s of a worker's own time in which a flight gains no simulated time
@@ -307,7 +308,10 @@ def _note(simulated: float, so_far: object = None) -> None:
 
 def _fly_chunk(slot: int, message: bytes) -> list[WorkerResult | str]:
     """For each task of a message its result, or in words what went wrong."""
-    tasks: list[Task] = pickle.loads(zlib.decompress(message))
+    try:
+        tasks: list[Task] = pickle.loads(zlib.decompress(message))
+    except LawError as error:
+        raise WorkersError(f"a law has changed during the run: {error}: run the same command again") from None
     notes, folder, fly = _SHARED["notes"], _SHARED["folder"], _SHARED["fly"]
     _SHARED["at"] = _NOTES * slot + 1
     answers: list[WorkerResult | str] = []

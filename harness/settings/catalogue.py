@@ -80,7 +80,7 @@ TABLES = (
 def keys_of(table: SettingsTable) -> Iterator[SettingsKey]:
     """The keys of a table, without tables that have an entry of their own."""
     if table.kind is StandoffLaw:
-        yield SettingsKey("name", "", REQUIRED, "", tuple(LAWS), "the guidance law")
+        yield SettingsKey("name", "", REQUIRED, "", tuple(LAWS), "the guidance law; one of your own: FILE.py:CLASS")
         sets = dict.fromkeys([*(gains for law in LAWS.values() for gains in law.sets), CUSTOM])
         defaults = ", ".join(f"{law.default} for {name}" for name, law in LAWS.items())
         yield SettingsKey("gains", "", f"({defaults})", "", tuple(sets), "a named set of the law's gains")

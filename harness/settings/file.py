@@ -174,7 +174,7 @@ def _leave_out_gains_of_another_law(before: Mapping[str, Any], changed: Settings
     if ("flight", "law", "name") not in changed.overrides or former.get("name") in (None, law["name"]):
         return
     names = law["name"] if isinstance(law["name"], list) else [law["name"]]
-    if not all(isinstance(name, str) and (name in LAWS or ":" in name) for name in names):
+    if not all(isinstance(name, str) and (name in LAWS or is_own(name)) for name in names):
         return  # a mistake, which the check tells
     shared = {"name", *schema_of(StandoffLaw).settings}
     left_out = [key for key in law if key not in shared and ("flight", "law", key) not in changed.overrides]

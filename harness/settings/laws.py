@@ -8,6 +8,7 @@ import ast
 import copyreg
 import math
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
@@ -89,6 +90,8 @@ class NotRun:
 _LOADED: dict[tuple[str, tuple[str, ...]], OwnLaw] = {}  # by name and content
 _LATEST: dict[str, OwnLaw] = {}  # by name
 _BY_CLASS: dict[type, OwnLaw] = {}
+_FOUND: dict[str, tuple[Source, list[tuple[int, int, int]]]] = {}  # by name, with the stamps of its files
+_YOUNG = 100_000_000  # ns
 
 
 def kind_of(name: str, *, run: bool) -> LawKind:
@@ -172,7 +175,29 @@ def is_unchanged(settings: Mapping[str, Any], content: Mapping[str, str]) -> Non
 
 
 def find(name: str) -> Source:
-    """The source of a law of one's own, found and read without running it. Raises `LawError`."""
+    """The source of a law of one's own, found and read without running it. Raises `LawError`.
+
+    It is read again when one of its files has another time or size; always while they are so young that a time tells
+    too little.
+    """
+    if name in _FOUND and _FOUND[name][1] == _stamps(_FOUND[name][0]):
+        return _FOUND[name][0]
+    source = _find(name)
+    stamps = _stamps(source)
+    if stamps and max(changed for changed, *_ in stamps) < time.time_ns() - _YOUNG:
+        _FOUND[name] = source, stamps
+    return source
+
+
+def _stamps(source: Source) -> list[tuple[int, int, int]]:
+    """Of each file when it changed, ns, its size and its number; empty when one is gone."""
+    try:
+        return [(of.st_mtime_ns, of.st_size, of.st_ino) for of in map(Path.stat, source.files.values())]
+    except OSError:
+        return []
+
+
+def _find(name: str) -> Source:
     where, colon, class_name = entries().get(name, name).rpartition(":")
     if not colon or not where or not class_name.isidentifier():
         known = ", ".join([*LAWS, *entries()])
