@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict bench tuned_gains fuzz clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains fuzz clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -58,6 +58,11 @@ verdict: install  ## fly the full matrix (half an hour on two processors), and w
 	$(BIN)/harness report out/assumption
 	$(BIN)/harness run experiments/quiet_gains.toml --out out/quiet_gains --log none
 	$(BIN)/python -m harness.studies.does_it_hold out/assumption out/quiet_gains --readme README.md --rows tests
+
+laws: install  ## fly every law in every air (ten minutes on two processors): docs/answers/floor.md, which_law.md
+	$(BIN)/python -m harness.studies.floor
+	$(BIN)/harness run experiments/laws.toml --out out/laws --log none
+	$(BIN)/python -m harness.studies.which_law out/laws
 
 bench: install  ## the speed of the loop, as ratios in one run, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed

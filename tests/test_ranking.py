@@ -10,7 +10,7 @@ import pytest
 from harness.verdict.pairs import CompareError
 from harness.verdict.ranking import Ranking, Relation, Tie, rankings
 
-TIE = Tie(share=0.2, absolute=0.001)
+TIE = Tie(share=0.2, least=0.001)
 AIR = "wind.turbulence"
 
 

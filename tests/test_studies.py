@@ -23,7 +23,17 @@ def study_command(study: str, *words: object) -> subprocess.CompletedProcess[str
 
 
 def test_each_study_is_a_command_that_says_what_it_does() -> None:
-    known = {"chatter", "does_it_hold", "estimator", "fitted", "floor", "limit_cycle", "statistics", "turbulence"}
+    known = {
+        "chatter",
+        "does_it_hold",
+        "estimator",
+        "fitted",
+        "floor",
+        "limit_cycle",
+        "statistics",
+        "turbulence",
+        "which_law",
+    }
     assert known <= set(STUDIES)
     for study in STUDIES:
         done = study_command(study, "--help")

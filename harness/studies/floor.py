@@ -58,8 +58,8 @@ ORDER = 40  # of the autoregression: 2 s; with 20 or 60 the floor moves by 3 % a
 SEEDS = 8
 DURATION, BEGIN = 300.0, 20.0  # s; what comes before is the start
 ACTIVITIES = (1.5, 2.0, 3.0, 5.0, 10.0, 20.0)  # deg/s^2, of the page's table
-# rho over V^2, s^2; with more the loop takes longer than 5 s: its floor would rest on what is below 0.03 Hz, and that is
-# not seen well in the flights
+# rho over V^2, s^2; with more the loop takes longer than 5 s: its floor would rest on what is below 0.03 Hz, of which
+# the flights show too little
 WEIGHTS = np.geomspace(1e-4, 1e4, 33)
 CHECKED = (1.0, 1e2, 1e4)  # of them, flown
 COLUMNS = ("airframe", "turbulence", "activity deg/s2", "error m rms", "low", "high")  # of floor.csv
@@ -322,9 +322,10 @@ def checked(name: str, disturbance: Disturbance, weight: float, seeds: int = SEE
         log = simulate(flown, plant=Planted(Lagged(response), tuple(rates[order - 1 :].tolist())))
         first = round(BEGIN / PERIOD)
         e, u = log["range_error"][first:], log["heading_rate_command"][first:]
-        numbers.append((np.sqrt(np.mean(e**2)), np.degrees(np.abs(np.diff(u)).mean() / PERIOD)))
-    mean, half = np.mean(numbers, axis=0), _half_width(np.array(numbers))
-    return Check(point, (float(mean[0]), float(half[0])), (float(mean[1]), float(half[1])))
+        numbers.append((np.mean(e**2), np.degrees(np.abs(np.diff(u)).mean() / PERIOD)))
+    (square, activity), halves = np.mean(numbers, axis=0).tolist(), _half_width(np.array(numbers)).tolist()
+    error = math.sqrt(square)
+    return Check(point, (error, 0.5 * halves[0] / error), (activity, halves[1]))
 
 
 def _half_width(of_seeds: Array) -> Array:

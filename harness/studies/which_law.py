@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from harness.studies.command import out_option, run, write
 from harness.studies.floor import Level, between, read_floor
 from harness.template import template
 from harness.verdict.pairs import entered, spread
-from harness.verdict.ranking import Change, Ranking, Relation, Tie, rankings
+from harness.verdict.ranking import Change, Place, Ranking, Relation, Tie, rankings
 from harness.verdict.statistics import sample
 
 if TYPE_CHECKING:
@@ -89,6 +90,15 @@ class Compared(NamedTuple):
 
         return [a for a in laws if not any(beaten(a, b) for b in laws if b != a)]
 
+    @property
+    def efficient_in_words(self) -> str:
+        """The efficient laws, or the others where these are fewer."""
+        efficient = self.efficient
+        others = [law for law in self.error.orders[AIRCRAFT].places if law not in efficient]
+        if len(others) >= len(efficient):
+            return ", ".join(efficient)
+        return f"all but {', '.join(others)}" if others else "all"
+
 
 def compared(table: "pd.DataFrame") -> list[Compared]:
     """Every condition on every airframe; by condition, still air first."""
@@ -103,7 +113,7 @@ class Above(NamedTuple):
 
     law: str
     aircraft: str
-    error: float  # m rms
+    error: float  # m rms, over all seeds
     activity: float  # deg/s^2
     on_reference: float  # deg/s^2, its activity on the kinematic aircraft
     times: float  # its error over the floor's at its activity
@@ -127,7 +137,10 @@ def level(levels: Sequence[Level], activity: float) -> Level:
 
 
 def above_floor(table: "pd.DataFrame", floors: Mapping[str, Sequence[Level]]) -> Iterator[Above]:
-    """Every law on every airframe in turbulence that has a floor; the nearest to it first."""
+    """Every law on every airframe in turbulence that has a floor; the nearest to it first.
+
+    Squares are averaged over the seeds, as the floor does: the mean of errors, each of a short time, lies below it.
+    """
     there = table[(table["condition"] == TURBULENCE) & ~table["lost"].astype(bool)]
     found = []
     for (of_law, of_aircraft), rows in there.groupby(["law", "aircraft"], sort=False):
@@ -136,13 +149,15 @@ def above_floor(table: "pd.DataFrame", floors: Mapping[str, Sequence[Level]]) ->
         levels = floors.get(aircraft, ())
         if not len(flown) or not levels or flown[ACTIVITY].min() < min(point.activity for point in levels):
             continue  # so calm a law has no floor
-        ratios = [e / level(levels, a).error for e, a in zip(flown[ERROR], flown[ACTIVITY], strict=True)]
-        times = sample(np.array(ratios), flown["seed"].tolist(), drawn=True)
         activity = float(flown[ACTIVITY].mean())
-        low, high = times.interval() or (math.nan, math.nan)
+        floor = level(levels, activity)
+        squares = sample(flown[ERROR].to_numpy() ** 2, flown["seed"].tolist(), drawn=True)
+        low, high = squares.interval() or (math.nan, math.nan)
+        error, least, most = (math.sqrt(max(square, 0.0)) for square in (squares.mean, low, high))
+        on_reference = float(kinematic[ACTIVITY].mean())
         found.append(
-            Above(law, aircraft, float(flown[ERROR].mean()), activity, float(kinematic[ACTIVITY].mean()), times.mean,
-                  low, high, level(levels, activity))
+            Above(law, aircraft, error, activity, on_reference, error / floor.error, least / floor.error,
+                  most / floor.error, floor)
         )  # fmt: skip
     mean = {law: np.mean([each.times for each in found if each.law == law]) for law in {each.law for each in found}}
     yield from sorted(found, key=lambda each: (mean[each.law], each.law, each.aircraft))
@@ -156,17 +171,24 @@ def beaten_by(of: Compared, law: str, plant: str) -> tuple[int, int]:
 
 
 def reversals(each: Sequence[Compared]) -> Iterator[str]:
-    """A sentence for each pair of laws whose order is reversed."""
+    """A sentence for each law that falls behind others that it is better than on the reference."""
     for of in each:
         here, there = of.error.orders[REFERENCE].places, of.error.orders[AIRCRAFT].places
+        behind: dict[str, list[str]] = {}
         for change in filter(lambda change: change.is_reversal, of.changes):
-            pair = (change.law, change.other)
-            better, worse = pair if change.there is Relation.BETTER else pair[::-1]
+            law, other = (change.law, change.other) if change.there is Relation.WORSE else (change.other, change.law)
+            behind.setdefault(law, []).append(other)
+        for law, others in behind.items():
+            ahead = "; ".join(f"{other}, {_shown(here[other])} → {_shown(there[other])} m" for other in others)
             yield (
-                f"{of.condition}, {of.aircraft}: {better} instead of {worse}: {there[better].mean:.3g} against "
-                f"{there[worse].mean:.3g} m on {AIRCRAFT}, {here[better].mean:.3g} against {here[worse].mean:.3g} m on "
-                f"{REFERENCE} (n = {there[better].seeds})."
+                f"{of.condition}, {of.aircraft} (n = {there[law].seeds}): {law}, {_shown(here[law])} → "
+                f"{_shown(there[law])} m, falls behind {ahead}."
             )
+
+
+def _shown(place: Place) -> str:
+    low_high = f" [{place.low:.3g}, {place.high:.3g}]" if place.low < place.high else ""
+    return f"{place.mean:.3g}{low_high}"
 
 
 def paint(figure: Figure, each: Sequence[Compared], floors: Mapping[str, Sequence[Level]]) -> None:
@@ -189,7 +211,7 @@ def paint(figure: Figure, each: Sequence[Compared], floors: Mapping[str, Sequenc
             known = np.array([(point.activity, point.error) for point in floors[of.aircraft]])
             axes.plot(*known.T, color="black", linewidth=1.0, label="floor")
         axes.set(xscale="log", yscale="log", xlim=(0.005, 300.0), ylim=(5e-5, 50.0))
-        axes.axhline(TIES[ERROR].absolute, color=FAINT, linewidth=0.6, linestyle=":")
+        axes.axhline(TIES[ERROR].least, color=FAINT, linewidth=0.6, linestyle=":")
     for axes, of_condition in zip(panels[0], conditions, strict=True):
         axes.set_title(of_condition, fontsize=8)
     for axes, airframe in zip(panels[:, 0], airframes, strict=True):
@@ -244,7 +266,7 @@ def page(table: "pd.DataFrame", each: Sequence[Compared], above: Sequence[Above]
         "laws": sorted(table["law"].unique()),
         "seeds": int(table["seed"].nunique()),
         "flights": len(table),
-        "limit": sorted(table["law.max_heading_rate_deg_s"].unique()),
+        "limit": [f"{limit:g}" for limit in sorted(table["law.max_heading_rate_deg_s"].unique())],
         "airspeed": sorted(table["law.airspeed"].unique()),
         "aircraft": AIRCRAFT,
         "reference": REFERENCE,
@@ -257,12 +279,9 @@ def page(table: "pd.DataFrame", each: Sequence[Compared], above: Sequence[Above]
         "below": [one for one in above if one.is_below],
         "overstated": (min(overstated), max(overstated)) if overstated else None,
         "beaten_by": beaten_by,
-        "lost": {
-            (of.condition, of.aircraft, plant, law): count
-            for of in each
-            for plant, order in of.error.orders.items()
-            for law, count in order.left_out.items()
-        },
+        "lost": Counter(
+            (law, of.condition) for of in each for order in of.error.orders.values() for law in order.left_out
+        ),
         "number": lambda x: "–" if math.isnan(x) else f"{x:.2f}",
     }
     return template("harness.studies", "which_law.md.jinja").render(fields) + "\n"

@@ -1,14 +1,14 @@
 """Orders: which law is better on a plant, in one condition, and where another plant gives another order.
 
 A condition is one combination of all that was set, but for plant, law and seed; nothing is ever averaged over several.
-Of two laws in a condition one is better, or they tie, or the flights do not tell. They tie where the difference of
-their means is shown to lie within the tie's bounds, and differ where it is shown to lie outside; both by paired seeds,
-with Holm's adjustment over all pairs of laws and all plants of the condition.
+Of two laws in a condition one is better, or they tie, or the flights do not tell. They tie where their ratio is shown
+to lie within the tie's bounds, and differ where it is shown to lie outside: by the mean of its logarithm over paired
+seeds, with Holm's adjustment over all pairs of laws on the plant. A ratio in which the seeds agree is exact.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
 from typing import NamedTuple
@@ -18,18 +18,23 @@ import pandas as pd
 
 from harness.plants.ladder import BASELINE
 from harness.verdict.pairs import CompareError, is_drawn, ordered
-from harness.verdict.statistics import Array, Evidence, evidence, holm, sample
+from harness.verdict.statistics import Array, evidence, holm, sample
 
 
 class Tie(NamedTuple):
-    """Two numbers tie when they differ by less than a share of the smaller one, or by less than `absolute`."""
+    """Two numbers tie when they differ by less than a share of the smaller one; less than `least` counts as that."""
 
     share: float
-    absolute: float
+    least: float
 
-    def bound(self, a: Array, b: Array) -> Array:
-        """The largest difference of a tie, where a and b are the numbers; equal shapes."""
-        return np.maximum(self.share * np.minimum(a, b), self.absolute)
+    @property
+    def bound(self) -> float:
+        """The largest logarithm of the ratio of a tie."""
+        return math.log1p(self.share)
+
+    def times(self, a: Array | float, b: Array | float) -> Array:
+        """The logarithm of b over a."""
+        return np.asarray(np.log(np.maximum(b, self.least) / np.maximum(a, self.least)))
 
 
 class Relation(StrEnum):
@@ -126,8 +131,8 @@ class Ranking:
         return (float(first @ second) / scale if scale else math.nan), len(laws)
 
     def _sign(self, a: float, b: float) -> float:
-        bound = float(self.tie.bound(np.array(a), np.array(b)))
-        return 0.0 if abs(a - b) <= bound else math.copysign(1.0, b - a)
+        times = float(self.tie.times(a, b))
+        return 0.0 if abs(times) <= self.tie.bound else math.copysign(1.0, times)
 
 
 def rankings(
@@ -162,20 +167,29 @@ def _ranking(table: pd.DataFrame, at: Mapping[str, object], metric: str, tie: Ti
         placed = {law: Place(x.mean, *(x.interval() or (math.nan, math.nan)), x.seeds) for law, x in samples.items()}
         places[plant] = dict(sorted(placed.items(), key=lambda item: item[1].mean))
 
-    tested: list[tuple[str, str, str, float, Evidence]] = []
-    for plant, by_seed in numbers.items():
-        for law, other in combinations(places[plant], 2):
-            a, b = by_seed[law].to_numpy(), by_seed[other].to_numpy()
-            of_pair = sample(b - a, list(by_seed.index), drawn=drawn)
-            bound = tie.bound(a, b)
-            tested.append((plant, law, other, of_pair.mean, evidence(of_pair, -bound, bound)))
-    relations: dict[str, dict[tuple[str, str], Relation]] = {plant: {} for plant in numbers}
-    adjusted = holm([of.strongest for *_, of in tested])
-    for (plant, law, other, difference, of), p in zip(tested, adjusted, strict=True):
-        relation = Relation.UNDECIDED
-        if p <= significance:
-            apart = Relation.BETTER if difference > 0.0 else Relation.WORSE
-            relation = Relation.TIE if of.holds <= of.fails else apart
-        relations[plant][law, other] = relation
-    orders = {plant: Order(plant, places[plant], relations[plant], left_out[plant]) for plant in numbers}
+    orders = {
+        plant: Order(plant, places[plant], _relations(numbers[plant], places[plant], tie, significance, drawn=drawn),
+                     left_out[plant])
+        for plant in numbers
+    }  # fmt: skip
     return Ranking(at, metric, tie, orders)
+
+
+def _relations(
+    by_seed: pd.DataFrame, laws: Iterable[str], tie: Tie, significance: float, *, drawn: bool
+) -> dict[tuple[str, str], Relation]:
+    """Of each pair of laws, whose numbers are columns with a row for each seed."""
+    pairs = list(combinations(laws, 2))
+    samples = []
+    for law, other in pairs:
+        times = tie.times(by_seed[law].to_numpy(), by_seed[other].to_numpy())
+        of = sample(times, list(by_seed.index), drawn=drawn)
+        samples.append(of if of.varies else replace(of, drawn=False))
+    shown = [evidence(of, -tie.bound, tie.bound) for of in samples]
+    adjusted = holm([each.strongest for each in shown])
+    relations = {}
+    for pair, of, each, p in zip(pairs, samples, shown, adjusted, strict=True):
+        apart = Relation.BETTER if of.mean > 0.0 else Relation.WORSE
+        told = Relation.TIE if each.holds <= each.fails else apart
+        relations[pair] = told if p <= significance else Relation.UNDECIDED
+    return relations
