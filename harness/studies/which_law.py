@@ -22,7 +22,7 @@ from harness.studies.floor import Level, between, read_floor
 from harness.template import template
 from harness.verdict.pairs import entered, spread
 from harness.verdict.ranking import Change, Place, Ranking, Relation, Tie, rankings
-from harness.verdict.statistics import sample
+from harness.verdict.statistics import evidence, holm, sample
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 REFERENCE, AIRCRAFT = "kinematic", "sixdof"
 ERROR, ACTIVITY = "range_error_rms_m", "command_activity_deg_s2"
 TIES = {ERROR: Tie(0.2, 0.001), ACTIVITY: Tie(0.2, 0.05)}  # m, deg/s^2
+PAPERS = "nftsm scaled"
 STILL, TURBULENCE = "still air", "moderate turbulence"
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 _SMALLEST = {ERROR: 1e-4, ACTIVITY: 1e-2}  # drawn; less is drawn there
@@ -70,13 +71,6 @@ class Compared(NamedTuple):
     def reversed(self) -> int:
         """How many of them are reversals."""
         return sum(change.is_reversal for change in self.changes)
-
-    @property
-    def unbeaten(self) -> list[str]:
-        """The laws that no other is shown to be better than by error, on the aircraft."""
-        order = self.error.orders[AIRCRAFT]
-        laws = list(order.places)
-        return [a for a in laws if not any(order.relation(b, a) is Relation.BETTER for b in laws if b != a)]
 
     @property
     def efficient(self) -> list[str]:
@@ -168,6 +162,23 @@ def beaten_by(of: Compared, law: str, plant: str) -> tuple[int, int]:
     order = of.error.orders[plant]
     others = [other for other in order.places if other != law]
     return sum(order.relation(other, law) is Relation.BETTER for other in others), len(others)
+
+
+def kept(table: "pd.DataFrame") -> dict[tuple[str, str], list[str]]:
+    """By condition and airframe the laws that keep the paper's promise on the aircraft.
+
+    That is the error of the paper's law on the reference: shown, seed by seed, to be no larger than a tie is.
+    """
+    tie, laws = TIES[ERROR], {}
+    for (of_condition, of_aircraft), rows in table.groupby(["condition", "aircraft"], sort=False):
+        by_seed = rows.pivot(index="seed", columns=["plant", "law"], values=ERROR).dropna(axis="columns")
+        if (REFERENCE, PAPERS) not in by_seed or AIRCRAFT not in by_seed:
+            continue
+        promised, flown = by_seed[REFERENCE, PAPERS], by_seed[AIRCRAFT]
+        p = holm([evidence(tie.ratios(promised, flown[law], drawn=True), None, tie.bound).holds for law in flown])
+        shown = np.asarray(p) <= Assess().significance
+        laws[str(of_condition), str(of_aircraft)] = [str(law) for law in flown.columns[shown]]
+    return laws
 
 
 def reversals(each: Sequence[Compared]) -> Iterator[str]:
@@ -279,6 +290,8 @@ def page(table: "pd.DataFrame", each: Sequence[Compared], above: Sequence[Above]
         "below": [one for one in above if one.is_below],
         "overstated": (min(overstated), max(overstated)) if overstated else None,
         "beaten_by": beaten_by,
+        "papers": PAPERS,
+        "kept": kept(table),
         "lost": Counter(
             (law, of.condition) for of in each for order in of.error.orders.values() for law in order.left_out
         ),

@@ -18,7 +18,7 @@ import pandas as pd
 
 from harness.plants.ladder import BASELINE
 from harness.verdict.pairs import CompareError, is_drawn, ordered
-from harness.verdict.statistics import Array, evidence, holm, sample
+from harness.verdict.statistics import Array, Sample, evidence, holm, sample
 
 
 class Tie(NamedTuple):
@@ -35,6 +35,11 @@ class Tie(NamedTuple):
     def times(self, a: Array | float, b: Array | float) -> Array:
         """The logarithm of b over a."""
         return np.asarray(np.log(np.maximum(b, self.least) / np.maximum(a, self.least)))
+
+    def ratios(self, a: pd.Series, b: pd.Series, *, drawn: bool) -> Sample:
+        """These logarithms over the seeds, the index of both; exact where they agree."""
+        of = sample(self.times(a.to_numpy(float), b.to_numpy(float)), a.index.to_list(), drawn=drawn)
+        return of if of.varies else replace(of, drawn=False)
 
 
 class Relation(StrEnum):
@@ -180,11 +185,7 @@ def _relations(
 ) -> dict[tuple[str, str], Relation]:
     """Of each pair of laws, whose numbers are columns with a row for each seed."""
     pairs = list(combinations(laws, 2))
-    samples = []
-    for law, other in pairs:
-        times = tie.times(by_seed[law].to_numpy(), by_seed[other].to_numpy())
-        of = sample(times, list(by_seed.index), drawn=drawn)
-        samples.append(of if of.varies else replace(of, drawn=False))
+    samples = [tie.ratios(by_seed[law], by_seed[other], drawn=drawn) for law, other in pairs]
     shown = [evidence(of, -tie.bound, tie.bound) for of in samples]
     adjusted = holm([each.strongest for each in shown])
     relations = {}
