@@ -11,8 +11,8 @@ from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.lagged import Lagged
 from harness.studies.floor import (
+    Autoregression,
     Circle,
-    Disturbance,
     Planted,
     between,
     checked,
@@ -31,7 +31,7 @@ from tests.builders import ROOT
 
 ULTRA = identified(aircraft.folder("ultra_stick_25e"), 13.0).heading_rate
 CIRCLE = Circle(ULTRA, 13.0, 200.0)
-AIR = Disturbance(np.array([1.2, -0.25]), 0.008, np.zeros(0))
+AIR = Autoregression(np.array([1.2, -0.25]), 0.008, np.zeros(0))
 
 
 def test_the_closed_form_is_what_the_linear_loop_comes_to() -> None:

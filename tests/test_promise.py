@@ -14,7 +14,7 @@ from harness.studies.promise import (
     ERROR,
     KNOWING,
     SETTLED,
-    Line,
+    Asked,
     lines,
     measured,
     page,
@@ -51,7 +51,7 @@ def test_a_flight_that_is_lost_or_does_not_settle_meets_no_bound() -> None:
     own: Any = flight.law
     lost = measured(still, replace(flight, law=replace(own, standoff=1.0), duration=30.0))
     assert math.isnan(lost["convergence_time_s"])
-    line = Line("still air", "nftsm_lead", SETTLED, dict.fromkeys(AIRFRAMES, math.nan), dict.fromkeys(AIRFRAMES, 20.0))
+    line = Asked("still air", "nftsm_lead", SETTLED, dict.fromkeys(AIRFRAMES, math.nan), dict.fromkeys(AIRFRAMES, 20.0))
     assert not line.is_met
     told = page([line], [])
     assert "**0 of 1 bounds" in told
@@ -60,5 +60,5 @@ def test_a_flight_that_is_lost_or_does_not_settle_meets_no_bound() -> None:
 
 def test_the_table_has_a_line_for_each_bound() -> None:
     values = dict.fromkeys(AIRFRAMES, 0.5)
-    text = table([Line("a", "lq_orbit", ERROR, values, values), Line("a", "lq_orbit", ACTIVITY, values, values)])
+    text = table([Asked("a", "lq_orbit", ERROR, values, values), Asked("a", "lq_orbit", ACTIVITY, values, values)])
     assert [row["met"] for row in csv.DictReader(text.splitlines())] == ["True", "True"]

@@ -8,7 +8,7 @@ import pytest
 import aircraft
 from autopilot.laws import LAWS
 from harness import run
-from harness.studies.floor import Level, read_floor
+from harness.studies.floor import FloorAt, read_floor
 from harness.studies.which_law import (
     ACTIVITY,
     AIRCRAFT,
@@ -84,7 +84,7 @@ def test_the_kinematic_aircraft_overstates_activity_in_gusts_and_no_law_flies_be
 
 
 def test_a_law_below_the_floor_is_told() -> None:
-    floor = Level("x", 3.0, 0.2, 0.18, 0.22)
+    floor = FloorAt("x", 3.0, 0.2, 0.18, 0.22)
     of = Above("a", "x", 0.1, 3.0, 9.0, 0.5, 0.4, 0.6, floor)
     assert of.is_below
     assert not of._replace(high=0.95).is_below  # within the floor's own interval

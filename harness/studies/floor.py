@@ -66,7 +66,7 @@ COLUMNS = ("airframe", "turbulence", "activity deg/s2", "error m rms", "low", "h
 _QUIET = {"k2": 1.0, "k3": 0.5}  # of NFTSM: without a limit cycle on each airframe
 
 
-class Disturbance(NamedTuple):
+class Autoregression(NamedTuple):
     """The rate of the heading error that turbulence adds: an autoregression, each value held for a period."""
 
     coefficients: Array  # of the values before, the latest first
@@ -85,7 +85,7 @@ class Disturbance(NamedTuple):
         return np.asarray(2.0 * period * self.deviation**2 * np.abs(shape) ** 2)
 
 
-def fitted(series: Sequence[Array], order: int = ORDER) -> Disturbance:
+def fitted(series: Sequence[Array], order: int = ORDER) -> Autoregression:
     """The autoregression of these series, rad/s, by least squares; their common mean is left out."""
     mean = np.mean([x.mean() for x in series])
     centred = [x - mean for x in series]
@@ -93,7 +93,7 @@ def fitted(series: Sequence[Array], order: int = ORDER) -> Disturbance:
     now = np.concatenate([x[order:] for x in centred])
     coefficients = np.linalg.lstsq(before, now, rcond=None)[0]
     residual = now - before @ coefficients
-    return Disturbance(coefficients, float(np.sqrt(np.mean(residual**2))), residual)
+    return Autoregression(coefficients, float(np.sqrt(np.mean(residual**2))), residual)
 
 
 class Circle(NamedTuple):
@@ -105,7 +105,7 @@ class Circle(NamedTuple):
     period: float = PERIOD
 
 
-class Model(NamedTuple):
+class CircleModel(NamedTuple):
     """z' = F z + g v + h (what is new of d), of a period, with the change v of the command.
 
     z is (range error, heading error, response, the latest commands, the present and former values of d).
@@ -117,7 +117,7 @@ class Model(NamedTuple):
     known: int  # of z's numbers: all but the disturbance
 
 
-def model(circle: Circle, disturbance: Disturbance) -> Model:
+def model(circle: Circle, disturbance: Autoregression) -> CircleModel:
     """The circle and its disturbance, exact between two commands."""
     A, b, c = circle.response.matrices()
     n, T, V = 2 + len(b), circle.period, circle.speed
@@ -143,10 +143,10 @@ def model(circle: Circle, disturbance: Disturbance) -> Model:
     F[n + kept, n + kept :] = disturbance.coefficients
     F[range(n + kept + 1, size), range(n + kept, size - 1)] = 1.0
     h[n + kept] = disturbance.deviation
-    return Model(F, g, h, n + kept)
+    return CircleModel(F, g, h, n + kept)
 
 
-class Point(NamedTuple):
+class Optimum(NamedTuple):
     """The optimal law of a weight rho, and what it comes to."""
 
     weight: float  # rho, m^2 s^2
@@ -155,7 +155,7 @@ class Point(NamedTuple):
     gains: Array  # v = -gains z
 
 
-def optimal(of: Model, weight: float, period: float = PERIOD) -> Point:
+def optimal(of: CircleModel, weight: float, period: float = PERIOD) -> Optimum:
     """The law that knows everything, and its range error and activity, in closed form."""
     F, g, h, _ = of
     Q = np.zeros_like(F)
@@ -164,10 +164,10 @@ def optimal(of: Model, weight: float, period: float = PERIOD) -> Point:
     gains = np.asarray(g @ P @ F / (weight + g @ P @ g))
     S = solve_discrete_lyapunov(F - np.outer(g, gains), np.outer(h, h))
     change = math.sqrt(gains @ S @ gains)
-    return Point(weight, math.sqrt(S[0, 0]), math.degrees(math.sqrt(2.0 / math.pi) * change) / period, gains)
+    return Optimum(weight, math.sqrt(S[0, 0]), math.degrees(math.sqrt(2.0 / math.pi) * change) / period, gains)
 
 
-def front(circle: Circle, disturbance: Disturbance) -> list[Point]:
+def front(circle: Circle, disturbance: Autoregression) -> list[Optimum]:
     """The floor, from the most active law to the least."""
     of = model(circle, disturbance)
     return [optimal(of, float(weight) * circle.speed**2, circle.period) for weight in WEIGHTS]
@@ -179,12 +179,12 @@ def between(x: float, known: Sequence[tuple[float, float]]) -> float:
     return math.exp(float(np.interp(math.log(x), xs, ys))) if x > 0.0 else math.inf
 
 
-def error_at(points: Sequence[Point], activity: float) -> float:
+def error_at(points: Sequence[Optimum], activity: float) -> float:
     """The least range error, m rms, at this activity, deg/s^2."""
     return between(activity, [(point.activity, point.error) for point in points])
 
 
-class Flown(NamedTuple):
+class HeldTurn(NamedTuple):
     """What turbulence does to an airframe whose command is held at the turn of its circle."""
 
     disturbance: Array  # rad/s, each the mean of a period
@@ -208,7 +208,7 @@ def flight_of(name: str, seed: int, plant: str = "sixdof", duration: float = DUR
     )
 
 
-def held(flight: Flight) -> Flown:
+def held(flight: Flight) -> HeldTurn:
     """The disturbance with the command held, so that no law has a part in it."""
     flying, standoff = plant_of(flight).start(flight.start, air_of(flight)), flight.law.standoff
     velocity = []
@@ -217,14 +217,14 @@ def held(flight: Flight) -> Flown:
         velocity.append((flying.state.velocity_north, flying.state.velocity_east))
     north, east = np.array(velocity)[round(BEGIN / flight.guidance_period) :].T
     speed, rate = np.hypot(north, east), np.diff(np.unwrap(np.arctan2(east, north))) / flight.guidance_period
-    return Flown(rate + 0.5 * (speed[1:] + speed[:-1]) / standoff, float(speed.mean()))
+    return HeldTurn(rate + 0.5 * (speed[1:] + speed[:-1]) / standoff, float(speed.mean()))
 
 
 def under_law(log: FlightLog, response: Response) -> Array:
     """The same from a flight of a law: what the model leaves of the rate of its heading error, rad/s."""
     flight = log.flight
     circle = Circle(response, flight.start.airspeed, flight.law.standoff, flight.guidance_period)
-    of = model(circle, Disturbance(np.zeros(1), 0.0, np.zeros(0)))
+    of = model(circle, Autoregression(np.zeros(1), 0.0, np.zeros(0)))
     theta, e = np.unwrap(log["heading_error"]), log["range_error"]
     u = log["heading_rate_command"] + circle.speed / circle.standoff
     z, left = np.zeros(len(of.F)), np.zeros(len(u) - 1)
@@ -273,7 +273,7 @@ class _PlantedFlying:
 class Omniscient:
     """The optimal law in flight: it knows the planted disturbance, and the response by its own commands."""
 
-    of: Model
+    of: CircleModel
     gains: Array
     rates: Array  # rad/s, one for each period, and before them as many as the autoregression looks back
     speed: float
@@ -303,12 +303,12 @@ class Omniscient:
 class Check(NamedTuple):
     """An optimal law flown on `lagged` with the planted disturbance, beside what the closed form says."""
 
-    predicted: Point
+    predicted: Optimum
     error: tuple[float, float]  # m rms, mean of the seeds and its 95 % interval's half width
     activity: tuple[float, float]  # deg/s^2
 
 
-def checked(name: str, disturbance: Disturbance, weight: float, seeds: int = SEEDS) -> Check:
+def checked(name: str, disturbance: Autoregression, weight: float, seeds: int = SEEDS) -> Check:
     """The optimal law of this weight (rho over V^2) flown, from the circle on."""
     flight = flight_of(name, 0, "lagged")
     speed, standoff = flight.start.airspeed, flight.law.standoff
@@ -334,7 +334,7 @@ def _half_width(of_seeds: Array) -> Array:
     return np.asarray(student.ppf(0.975, n - 1) * of_seeds.std(axis=0, ddof=1) / math.sqrt(n))
 
 
-class Level(NamedTuple):
+class FloorAt(NamedTuple):
     """A point of an airframe's floor, and the 95 % interval of its error at this activity, over the seeds."""
 
     airframe: str
@@ -351,20 +351,20 @@ class Floor:
     airframe: str
     speed: float  # m/s, mean over the ground
     standoff: float
-    disturbance: Disturbance
+    disturbance: Autoregression
     measured: Sequence[Array]  # rad/s, what it was fitted to, by seed
-    points: Sequence[Point]
-    without_one: Sequence[Sequence[Point]]  # the floor without the first seed, without the second, and so on
-    under_law: Sequence[Point]  # the floor of the disturbance that flights of a law show
+    points: Sequence[Optimum]
+    without_one: Sequence[Sequence[Optimum]]  # the floor without the first seed, without the second, and so on
+    under_law: Sequence[Optimum]  # the floor of the disturbance that flights of a law show
     checks: Sequence[Check]
 
-    def level(self, activity: float) -> Level:
+    def level(self, activity: float) -> FloorAt:
         """The floor at this activity; its interval by leaving out one seed at a time (jackknife)."""
         error, n = error_at(self.points, activity), len(self.without_one)
         logs = np.log([error_at(points, activity) for points in self.without_one])
         scatter = math.sqrt((n - 1) / n * float(np.sum((logs - logs.mean()) ** 2)))
         factor = math.exp(float(student.ppf(0.975, n - 1)) * scatter)
-        return Level(self.airframe, activity, error, error / factor, error * factor)
+        return FloorAt(self.airframe, activity, error, error / factor, error * factor)
 
     @property
     def memory(self) -> float:
@@ -441,12 +441,12 @@ def floor_csv(floors: Sequence[Floor]) -> str:
     return text.getvalue()
 
 
-def read_floor(path: Path) -> dict[str, list[Level]]:
+def read_floor(path: Path) -> dict[str, list[FloorAt]]:
     """The floor of each airframe, from `floor.csv`."""
-    levels: dict[str, list[Level]] = {}
+    levels: dict[str, list[FloorAt]] = {}
     with path.open(encoding="utf-8", newline="") as file:
         for airframe, _, *numbers in list(csv.reader(file))[1:]:
-            levels.setdefault(airframe, []).append(Level(airframe, *map(float, numbers)))
+            levels.setdefault(airframe, []).append(FloorAt(airframe, *map(float, numbers)))
     return levels
 
 

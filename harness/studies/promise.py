@@ -55,7 +55,7 @@ class Bound(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Condition:
+class Situation:
     """What is flown, and what is asked. Speeds, m/s, are those at 13 m/s, and grow with the airspeed."""
 
     name: str
@@ -108,7 +108,7 @@ def _calm(error: float, *more: Bound) -> tuple[Bound, ...]:
 _AS_KINEMATIC = Bound(ACTIVITY, 1.1, of_kinematic=True, more=0.02)
 _STILL = Bound(ACTIVITY, 0.05)
 CONDITIONS = (
-    Condition(
+    Situation(
         name="still air",
         bounds=_calm(
             0.001,
@@ -117,34 +117,34 @@ CONDITIONS = (
             Bound(SETTLED, 20.0, "lq_orbit"),
         ),
     ),
-    Condition(name="wind of 30 %", wind=0.3, bounds=_calm(0.005, _AS_KINEMATIC)),
-    Condition(name="wind of 60 %", wind=0.6, limit=15.0, bounds=_calm(0.015, _AS_KINEMATIC)),
-    Condition(name="target at 2 m/s, wind of 3 m/s", target=2.0, bounds=_calm(0.005)),
-    Condition(
+    Situation(name="wind of 30 %", wind=0.3, bounds=_calm(0.005, _AS_KINEMATIC)),
+    Situation(name="wind of 60 %", wind=0.6, limit=15.0, bounds=_calm(0.015, _AS_KINEMATIC)),
+    Situation(name="target at 2 m/s, wind of 3 m/s", target=2.0, bounds=_calm(0.005)),
+    Situation(
         name="response told half as quick",
         errors=Errors(response_speed=0.5),
         bounds=(Bound(ERROR, 0.015), Bound(ACTIVITY, 0.6)),
     ),
-    Condition(
+    Situation(
         name="response told twice as quick",
         errors=Errors(response_speed=2.0),
         bounds=(Bound(ERROR, 0.015), Bound(ACTIVITY, 0.6)),
     ),
-    Condition(
+    Situation(
         name="100 ms of delay",
         errors=Errors(command_delay=0.1),
         bounds=(Bound(ERROR, 0.01), Bound(ACTIVITY, 0.1)),
     ),
-    Condition(
+    Situation(
         name="wind of 60 %, its estimate wrong by 1 m/s",
         wind=0.6,
         limit=15.0,
         errors=Errors(wind=1.0, wind_heading=math.radians(45.0)),
         bounds=(Bound(ERROR, 0.05),),
     ),
-    Condition(name="guidance every 0.1 s", period=0.1, bounds=(Bound(ACTIVITY, 0.15),)),
-    Condition(name="kinematic, predicted all the same", plant=BASELINE, modelled=True, bounds=(Bound(ACTIVITY, 0.01),)),
-    Condition(
+    Situation(name="guidance every 0.1 s", period=0.1, bounds=(Bound(ACTIVITY, 0.15),)),
+    Situation(name="kinematic, predicted all the same", plant=BASELINE, modelled=True, bounds=(Bound(ACTIVITY, 0.01),)),
+    Situation(
         name="moderate turbulence",
         turbulence="moderate",
         duration=150.0,
@@ -155,21 +155,21 @@ CONDITIONS = (
             Bound(ACTIVITY, 5.5, "lq_orbit"),
         ),
     ),
-    Condition(
+    Situation(
         name="moderate, response told half as quick",
         turbulence="moderate",
         duration=150.0,
         errors=Errors(response_speed=0.5),
         bounds=(Bound(ERROR, 0.40, "nftsm_lead"), Bound(ERROR, 0.22, "lq_orbit")),
     ),
-    Condition(
+    Situation(
         name="moderate, response told twice as quick",
         turbulence="moderate",
         duration=150.0,
         errors=Errors(response_speed=2.0),
         bounds=(Bound(ERROR, 0.40, "nftsm_lead"), Bound(ERROR, 0.22, "lq_orbit")),
     ),
-    Condition(
+    Situation(
         name="wind of 60 %, moderate turbulence",
         wind=0.6,
         limit=15.0,
@@ -177,11 +177,11 @@ CONDITIONS = (
         duration=150.0,
         bounds=(Bound(ERROR, 0.22),),
     ),
-    Condition(name="severe turbulence", turbulence="severe", duration=150.0, bounds=(Bound(ERROR, 0.35),)),
+    Situation(name="severe turbulence", turbulence="severe", duration=150.0, bounds=(Bound(ERROR, 0.35),)),
 )
 
 
-class Line(NamedTuple):
+class Asked(NamedTuple):
     """One law in one condition: per airframe the means over the seeds of what is bounded, and whether it is allowed."""
 
     condition: str
@@ -205,7 +205,7 @@ class Line(NamedTuple):
         return f"{METRICS[self.metric].heading}, {METRICS[self.metric].label}"
 
 
-def means(condition: Condition, name: str, gains: str, airframe: str, times: float = 1.0) -> Mapping[str, float]:
+def means(condition: Situation, name: str, gains: str, airframe: str, times: float = 1.0) -> Mapping[str, float]:
     """Over the seeds, of all metrics that a bound may ask for, with so many times k2 and k3; NaN where one has none."""
     every = []
     for seed in condition.seeds:
@@ -217,7 +217,7 @@ def means(condition: Condition, name: str, gains: str, airframe: str, times: flo
     return {metric: float(np.mean([one[metric] for one in every])) for metric in every[0]}
 
 
-def measured(condition: Condition, flight: Flight) -> Mapping[str, float]:
+def measured(condition: Situation, flight: Flight) -> Mapping[str, float]:
     """The metrics of one flight; all NaN of one that did not last."""
     context = context_of(flight)._replace(at_once=False) if condition.modelled else None
     log = simulate(flight, context=context)
@@ -228,7 +228,7 @@ def measured(condition: Condition, flight: Flight) -> Mapping[str, float]:
     }
 
 
-def lines(conditions: Sequence[Condition] = CONDITIONS, airframes: Sequence[str] = AIRFRAMES) -> Iterator[Line]:
+def lines(conditions: Sequence[Situation] = CONDITIONS, airframes: Sequence[str] = AIRFRAMES) -> Iterator[Asked]:
     """Every bound of every condition, for each law that it binds."""
     for condition in conditions:
         beside = {}
@@ -239,7 +239,7 @@ def lines(conditions: Sequence[Condition] = CONDITIONS, airframes: Sequence[str]
             found = {airframe: means(condition, name, gains, airframe) for airframe in airframes}
             for bound in condition.bounds:
                 if bound.law in ("", name):
-                    yield Line(
+                    yield Asked(
                         condition.name,
                         name,
                         bound.metric,
@@ -282,7 +282,7 @@ def beside(airframes: Sequence[str] = AIRFRAMES) -> Iterator[Beside]:
         yield Beside(what, error, activity)
 
 
-def page(found: Sequence[Line], others: Sequence[Beside]) -> str:
+def page(found: Sequence[Asked], others: Sequence[Beside]) -> str:
     """The page."""
     shown = template("harness.studies", "promise.md.jinja").render(
         lines=found, others=others, airframes=AIRFRAMES, number=number, seeds=SEEDS
@@ -295,7 +295,7 @@ def number(value: float) -> str:
     return "none" if math.isnan(value) else "< 1e-6" if 0.0 < value < 1e-6 else f"{value:.3g}"
 
 
-def table(found: Sequence[Line]) -> str:
+def table(found: Sequence[Asked]) -> str:
     """Every bound, a line each, as CSV."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -18,10 +18,10 @@ from harness.drawing import COLOURS, FAINT, draw
 from harness.margins import Assess
 from harness.runs.comparable import comparable
 from harness.studies.command import out_option, run, write
-from harness.studies.floor import Level, between, read_floor
+from harness.studies.floor import FloorAt, between, read_floor
 from harness.template import template
 from harness.verdict.pairs import entered, spread
-from harness.verdict.ranking import Change, Place, Ranking, Relation, Tie, rankings
+from harness.verdict.ranking import Ranking, Relation, Reordered, Standing, Tie, rankings
 from harness.verdict.statistics import evidence, holm, sample
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Compared(NamedTuple):
     activity: Ranking
 
     @property
-    def changes(self) -> list[Change]:
+    def changes(self) -> list[Reordered]:
         """Pairs of laws in another order by error on the aircraft than on the reference, or tied on one only."""
         return self.error.changes(AIRCRAFT)
 
@@ -113,7 +113,7 @@ class Above(NamedTuple):
     times: float  # its error over the floor's at its activity
     low: float  # 95 % interval over the seeds
     high: float
-    floor: Level  # at its mean activity
+    floor: FloorAt  # at its mean activity
 
     @property
     def is_below(self) -> bool:
@@ -121,16 +121,16 @@ class Above(NamedTuple):
         return self.high * self.floor.error < self.floor.low
 
 
-def level(levels: Sequence[Level], activity: float) -> Level:
+def level(levels: Sequence[FloorAt], activity: float) -> FloorAt:
     """The floor at an activity, between its published points."""
     error, low, high = (
         between(activity, [(point.activity, getattr(point, name)) for point in levels])
         for name in ("error", "low", "high")
     )
-    return Level(levels[0].airframe, activity, error, low, high)
+    return FloorAt(levels[0].airframe, activity, error, low, high)
 
 
-def above_floor(table: "pd.DataFrame", floors: Mapping[str, Sequence[Level]]) -> Iterator[Above]:
+def above_floor(table: "pd.DataFrame", floors: Mapping[str, Sequence[FloorAt]]) -> Iterator[Above]:
     """Every law on every airframe in turbulence that has a floor; the nearest to it first.
 
     Squares are averaged over the seeds, as the floor does: the mean of errors, each of a short time, lies below it.
@@ -197,12 +197,12 @@ def reversals(each: Sequence[Compared]) -> Iterator[str]:
             )
 
 
-def _shown(place: Place) -> str:
+def _shown(place: Standing) -> str:
     low_high = f" [{place.low:.3g}, {place.high:.3g}]" if place.low < place.high else ""
     return f"{place.mean:.3g}{low_high}"
 
 
-def paint(figure: Figure, each: Sequence[Compared], floors: Mapping[str, Sequence[Level]]) -> None:
+def paint(figure: Figure, each: Sequence[Compared], floors: Mapping[str, Sequence[FloorAt]]) -> None:
     """Error against activity, an airframe in each row and a condition in each column."""
     conditions, airframes = (list(dict.fromkeys(names)) for names in zip(*((c[0], c[1]) for c in each), strict=True))
     laws = sorted({law for of in each for law in of.error.orders[AIRCRAFT].places})
@@ -222,6 +222,7 @@ def paint(figure: Figure, each: Sequence[Compared], floors: Mapping[str, Sequenc
             known = np.array([(point.activity, point.error) for point in floors[of.aircraft]])
             axes.plot(*known.T, color="black", linewidth=1.0, label="floor")
         axes.set(xscale="log", yscale="log", xlim=(0.005, 300.0), ylim=(5e-5, 50.0))
+        axes.minorticks_off()
         axes.axhline(TIES[ERROR].least, color=FAINT, linewidth=0.6, linestyle=":")
     for axes, of_condition in zip(panels[0], conditions, strict=True):
         axes.set_title(of_condition, fontsize=8)

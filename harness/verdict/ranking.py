@@ -56,7 +56,7 @@ class Relation(StrEnum):
         return self in (Relation.BETTER, Relation.WORSE)
 
 
-class Place(NamedTuple):
+class Standing(NamedTuple):
     """A law on a plant in a condition: the mean of a metric over the seeds, and its 95 % interval."""
 
     mean: float
@@ -70,7 +70,7 @@ class Order:
     """The laws on one plant in one condition. A smaller number is better."""
 
     plant: str
-    places: Mapping[str, Place]  # by law, the best first
+    places: Mapping[str, Standing]  # by law, the best first
     relations: Mapping[tuple[str, str], Relation]  # of the first law against the second, for each pair of laws
     left_out: Mapping[str, int]  # laws without a place, and in how many seeds they were lost or have no such number
 
@@ -83,7 +83,7 @@ class Order:
         return opposite.get(relation, relation)
 
 
-class Change(NamedTuple):
+class Reordered(NamedTuple):
     """Two laws whose relation on a plant is another than on the reference: of `law` against `other`."""
 
     law: str
@@ -106,14 +106,14 @@ class Ranking:
     tie: Tie
     orders: Mapping[str, Order]  # by plant, up the ladder
 
-    def changes(self, plant: str, reference: str = BASELINE) -> list[Change]:
+    def changes(self, plant: str, reference: str = BASELINE) -> list[Reordered]:
         """The pairs of laws that the flights tell another order or tie of than on the reference; reversals first."""
         here, there = self.orders[reference], self.orders[plant]
         found = []
         for law, other in combinations([law for law in here.places if law in there.places], 2):
             relations = here.relation(law, other), there.relation(law, other)
             if relations[0] != relations[1] and Relation.UNDECIDED not in relations:
-                found.append(Change(law, other, *relations))
+                found.append(Reordered(law, other, *relations))
         return sorted(found, key=lambda change: not change.is_reversal)
 
     def undecided(self, plant: str, reference: str = BASELINE) -> tuple[int, int]:
@@ -169,7 +169,7 @@ def _ranking(table: pd.DataFrame, at: Mapping[str, object], metric: str, tie: Ti
         left_out[plant] = {str(law): int(count) for law, count in missing.items() if count}
         numbers[plant] = by_seed.drop(columns=list(left_out[plant]))
         samples = {str(law): sample(x.to_numpy(), list(x.index), drawn=drawn) for law, x in numbers[plant].items()}
-        placed = {law: Place(x.mean, *(x.interval() or (math.nan, math.nan)), x.seeds) for law, x in samples.items()}
+        placed = {law: Standing(x.mean, *(x.interval() or (math.nan, math.nan)), x.seeds) for law, x in samples.items()}
         places[plant] = dict(sorted(placed.items(), key=lambda item: item[1].mean))
 
     orders = {
