@@ -1,8 +1,9 @@
 """Linear-quadratic circling: the least range error for a given effort behind the identified inner loop."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import copysign, pi, sqrt
 from types import MappingProxyType
 from typing import Annotated, ClassVar
 
@@ -24,7 +25,10 @@ from autopilot.standoff import (
     relative_motion,
 )
 
-GAIN_SETS = MappingProxyType({"slow": {"weight": 40.0}})
+_RESERVED = 0.3  # of the turn rate beyond the circle's, for what the field does not know
+_FASTEST = pi  # rad/s: of the field, where the command has no limit
+
+GAIN_SETS = MappingProxyType({"slow": {"weight": 20.0}})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,23 +41,23 @@ class LqOrbit(StandoffLaw):
     uses_response: ClassVar[bool] = True
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
     weight: Annotated[float, Ge(1e-3), Le(1e9), About("m2 s2/rad2: of the effort against the range error")]
-    steepest: Annotated[Degrees, Gt(0), About("largest angle of the field against the circle's tangent")] = 0.5
-    disturbance_time: Annotated[Seconds, Gt(0), Le(1e3), About("correlation time of the disturbance, AR(1)")] = 2.0
-    smoothing: Annotated[Seconds, Ge(0), Le(1e3), About("lag of the observed disturbance")] = 0.3
+    steepest: Annotated[Degrees, Gt(0), About("largest angle of the field against the circle's tangent")] = 1.0
+    disturbance_time: Annotated[Seconds, Gt(0), Le(1e3), About("correlation time of the disturbance, AR(1)")] = 1.25
+    smoothing: Annotated[Seconds, Ge(0), Le(1e3), About("lag of the observed disturbance")] = 0.35
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         R_d, response = self.standoff, None if context.at_once else context.response
         tau = response.lag if response else 0.0
         k = self.feedback(context)
-        k_states, field = tuple(k.states.tolist()), k.r / k.e  # rad/m: of the field near the circle
-        steepest = self.steepest
+        k_states = tuple(k.states.tolist())
+        field = self._field(k, context.nominal_airspeed)
         predictor = Predictor(response, context.period, self.smoothing)
 
         def answer(o: Observation, v_a: float, psi_a: float) -> Answer:
             motion = relative_motion(o, R_d, v_a, psi_a)
             r, _, _, e, _ = motion
             predictor.seen(e)
-            s = e + max(-steepest, min(steepest, field * r))
+            s = e + field(r)
             rest = -k.e * s - dot(k_states, predictor.states) - k.disturbance * predictor.disturbance
             return r, s, e, feed_forward_ahead(o, motion, R_d, v_a, psi_a, tau), rest
 
@@ -61,6 +65,22 @@ class LqOrbit(StandoffLaw):
             predictor.commanded(command - feed_forward)
 
         return limited_step(self, answer, applied)
+
+    def _field(self, k: Feedback, v_a: float) -> Callable[[float], float]:
+        """The angle, rad, at which the circle's tangent is approached from a range error.
+
+        Near the circle that of the gains, k.r r / k.e. Farther out sqrt(2 a |r| / v_a), along which the heading turns
+        by a for small angles: what the limit leaves beyond the turn of the circle, less a reserve.
+        """
+        limit, steepest = min(self.max_heading_rate, _FASTEST), self.steepest
+        a = (1.0 - _RESERVED) * max(limit - v_a / self.standoff, 0.1 * limit)
+        near, far = k.r / k.e, 2.0 * a / v_a
+
+        def field(r: float) -> float:
+            size = abs(r)
+            return copysign(min(near * size, sqrt(far * size), steepest), r)
+
+        return field
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
         """The theory of linear-quadratic control asks for a positive weight only, which the field holds."""

@@ -239,7 +239,7 @@ def test_the_gains_by_rule_follow_from_lag_and_airspeed() -> None:
     lead: Any = harness.law("nftsm_lead", "by_lag", flight=flight)
     lq: Any = harness.law("lq_orbit", "by_airspeed", flight=flight)
     assert (lead.k2, lead.k3) == pytest.approx((1.4 / (AEROSONDE.lag + 0.05), 0.7 / (AEROSONDE.lag + 0.05)), rel=2e-3)
-    assert lq.weight == pytest.approx(40.0 * (25.0 / 13.0) ** 2, rel=2e-3)
+    assert lq.weight == pytest.approx(20.0 * (25.0 / 13.0) ** 2, rel=2e-3)
 
 
 @BOTH
