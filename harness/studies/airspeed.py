@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 ALIKE = 1e-3  # m: errors that are no further apart are alike
 AIRSPEEDS = ("nominal", "measured", "ground")
-_CONDITION = ["aircraft", "wind_speed_mps", "wind.turbulence"]
+_CONDITION = ["aircraft", "wind_speed_mps", "errors.wind_mps", "wind.turbulence"]
 
 
 class ByAirspeed(NamedTuple):
@@ -41,10 +41,12 @@ def lines(flights: "pd.DataFrame") -> Iterator[ByAirspeed]:
     """One for each airframe in each air, in the order in which they were set."""
     speeds = [(north**2 + east**2) ** 0.5 for north, east in flights["wind.steady_mps"]]
     table = flights.assign(wind_speed_mps=speeds)
-    for (airframe, speed, severity), group in table.groupby(_CONDITION, sort=False):
+    for (airframe, speed, wrong, severity), group in table.groupby(_CONDITION, sort=False):
         by_seed = group.pivot_table(index="seed", columns="law.airspeed", values="range_error_rms_m")
         activity = group.groupby("law.airspeed")["command_activity_deg_s2"].mean()
         wind = f"wind of {speed:g} m/s" if speed else "no wind"
+        if wrong:
+            wind += f", estimated wrong by {wrong:g} m/s"
         yield ByAirspeed(
             airframe=str(airframe),
             air=f"{wind}, {severity} turbulence" if severity != "none" else wind,
