@@ -13,7 +13,8 @@ def planted() -> pd.DataFrame:
             for airspeed in AIRSPEEDS:
                 error = {"nominal": 2.0, "measured": 1.0, "ground": 0.5 if seed else 3.0}[airspeed]
                 rows.append(
-                    {"aircraft": "stick", "wind.steady_mps": (3.0, 4.0), "errors.wind_mps": 0.0, "wind.turbulence": turbulence, "seed": seed,
+                    {"aircraft": "stick", "wind.steady_mps": (3.0, 4.0), "errors.wind_mps": 0.0,
+                     "wind.turbulence": turbulence, "seed": seed,
                      "law.airspeed": airspeed, "command_activity_deg_s2": 1.0 + seed,
                      "range_error_rms_m": error if turbulence == "moderate" else 0.0}
                 )  # fmt: skip
