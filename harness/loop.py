@@ -102,7 +102,7 @@ def begun(law: Law, context: Context) -> LawStep:
     """The law in flight. Raises `End` when it cannot start."""
     try:
         return started(law, context)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise End(Outcome.INVALID, f"the law cannot start: {type(error).__name__}: {error}") from error
 
 
@@ -113,7 +113,7 @@ def command(law: LawStep, observation: Observation) -> Guidance:
         is_finite = math.isfinite(guidance.heading_rate)
     except End:  # it took too long
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise End(Outcome.INVALID, f"the law raised {type(error).__name__}: {error}") from error
     if not is_finite:
         raise End(Outcome.INVALID, f"the law commanded {guidance.heading_rate}")

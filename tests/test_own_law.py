@@ -3,6 +3,7 @@
 import math
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ import pandas as pd
 import pytest
 
 import harness
+from harness.files import content_hash
 from harness.key import files, flight_key
 from harness.limit_cycle.margin import margin_of
 from harness.log.signals import at_limit
 from harness.plants.plant import Outcome
+from harness.runs.store import content
 from harness.settings import SettingsError, document, flight_from_document
 from harness.settings.laws import entries
 from tests.builders import EXPERIMENTS, command, fly_matrix, invoke, write
@@ -94,6 +97,7 @@ def test_workers_fly_it_its_file_is_kept_and_an_edited_law_is_flown_anew(own: Pa
     run = ("run", own, "--out", own.parent / "out", "--log", "none", "--workers")
     first = invoke(*run, 1)
     assert "2 flown, 0 earlier, 0 failed" in first.output
+    assert content(own.parent / "out", content_hash(LEANING.encode())) == LEANING.encode()
     assert "0 flown, 2 earlier" in invoke(*run, 1).output
     write(own.parent / "leaning.py", LEANING.replace("0.02", "0.03"))
     assert "2 flown, 0 earlier, 0 failed" in invoke(*run, 1).output
@@ -433,3 +437,41 @@ def test_a_file_is_read_again_when_it_has_changed(tmp_path: Path) -> None:
     law_in(tmp_path, WHOLE.format(answer="0.2"))  # of the same size
     flight = harness.Flight(plant="kinematic", law=harness.law(law), duration=1.0)
     assert harness.simulate(flight)["heading_rate_command"][0] == 0.2
+
+
+def test_an_import_in_a_function_is_the_laws_own_and_one_for_scripts_is_not_run(own: Path) -> None:
+    text = PLAIN.replace("from leaning import lean\n", "").replace(
+        "        share =", "        from leaning import lean\n\n        share ="
+    )
+    script = "if __name__ == '__main__':\n    import script\n"
+    write(own.parent / "script.py", "raise RuntimeError('it is run')\n")
+    write(own.parent / "field.py", f"from __future__ import annotations\n{text}\n{script}")
+    flight = harness.Flight(plant="kinematic", law=harness.law("field.py:Field"), duration=30.0)
+    assert "law/leaning.py" in files(flight)
+    assert "law/script.py" not in files(flight)
+    before = harness.simulate(flight)
+    assert before.outcome is Outcome.COMPLETED
+    write(own.parent / "leaning.py", LEANING.replace("0.02", "0.05"))
+    edited = replace(flight, law=harness.law("field.py:Field"))
+    assert harness.simulate(edited).digest != before.digest
+
+
+def test_a_worker_whose_law_hangs_or_exits_costs_that_flight_alone(tmp_path: Path) -> None:
+    file = law_in(
+        tmp_path,
+        """
+    does: int = 0
+    def start(self, context):
+        def step(o):
+            while self.does == 1 and o.time > 0.2: pass
+            if self.does == 2: raise SystemExit(5)
+            return Guidance(0.05, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return step
+    def broken_conditions(self, speed_ratio): return []
+""",
+    )
+    flight = f'[flight]\nplant = "kinematic"\nduration_s = 1.0\nlaw.name = "{file}:Own"\n'
+    matrix = write(tmp_path / "m.toml", f'{flight}[matrix]\n"law.does" = [0, 1, 2]\n')
+    results = harness.run(matrix, tmp_path / "out", workers=1, log="none", timeout=1.0)
+    assert list(results["outcome"]) == ["completed", "timeout", "invalid"]
+    assert results["reason"][2] == "the law raised SystemExit: 5"

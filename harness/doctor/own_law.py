@@ -61,7 +61,7 @@ def examined(flight: Flight) -> Iterator[Found]:
         except End as end:
             yield Found(question, False, str(end))
             return  # it would not answer the others either
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             yield Found(question, False, f"it raised {type(error).__name__}: {error}")
         else:
             yield Found(question, True, text)

@@ -96,7 +96,7 @@ class Loop:
         try:
             step = self._in_the_papers_direction(seen(0.0, 0.0))
             commands = np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)], np.float64)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise LawFailed(f"the law raised {type(error).__name__}: {error}") from error
         if not np.isfinite(commands).all():
             raise LawFailed("the law commanded what is not finite")

@@ -30,6 +30,7 @@ FILES = "law/"  # begins what a version calls the files of a law of one's own
 FORMS = "FILE.py:CLASS or MODULE:CLASS"
 _MEMBERS = ("start", "command", "broken_conditions")  # besides the fields
 _FIELDS = ("standoff", "max_heading_rate")  # numbers that every result has
+_OTHERWISE = {"__name__", "TYPE_CHECKING"}  # in an `if`: what follows is not run when the file is imported
 _INSTALLED = ("site-packages", "dist-packages")
 
 
@@ -47,6 +48,7 @@ class Source(NamedTuple):
     root: Path  # below which its files lie
     files: Mapping[str, Path]  # its file and the local ones that it imports, by what a version calls them
     hashes: Mapping[str, str]  # of their content
+    classes: frozenset[str]  # that they define
 
     @property
     def is_module(self) -> bool:
@@ -168,7 +170,10 @@ def is_unchanged(settings: Mapping[str, Any], content: Mapping[str, str]) -> Non
             return
     then = {file: digest for file, digest in content.items() if file.startswith(FILES)}
     try:
-        if find(name).hashes != then or _own(name).source.hashes != then:
+        source = find(name)
+        if source.class_name not in source.classes:
+            raise LawError("its file has no such class")
+        if source.hashes != then or _own(name).source.hashes != then:
             raise LawError("it has changed since, and for a row only the law that it was flown with may be run")
     except LawError as error:
         raise SettingsError([f"flight.law.name: {short(name)}: {error}"]) from None
@@ -209,12 +214,14 @@ def _find(name: str) -> Source:
         root, package = main.parent, ""
     else:
         main, root, package = _module_file(where)
-    files = {_called(path, root): path for path in _closure(main, root, package)}
+    trees = _closure(main, root, package)
+    files = {_called(path, root): path for path in trees}
+    classes = frozenset(n.name for tree in trees.values() for n in tree.body if isinstance(n, ast.ClassDef))
     try:
         hashes = {label: content_hash(read(path)) for label, path in files.items()}
     except OSError as error:
         raise LawError(f"{error.filename}: {error.strerror}") from None
-    return Source(name, where, class_name, main, root, MappingProxyType(files), MappingProxyType(hashes))
+    return Source(name, where, class_name, main, root, MappingProxyType(files), MappingProxyType(hashes), classes)
 
 
 def _called(path: Path, root: Path) -> str:
@@ -246,29 +253,28 @@ def _module_file(module: str) -> tuple[Path, Path, str]:
     return main, root, "" if alone else words[0]
 
 
-def _closure(main: Path, root: Path, package: str) -> list[Path]:
+def _closure(main: Path, root: Path, package: str) -> dict[Path, ast.Module]:
     """The file and all that it imports, directly or not, from `root`: of `package` alone if one is given."""
-    found: dict[Path, None] = {}
+    found: dict[Path, ast.Module] = {}
     around = [folder / "__init__.py" for folder in main.parents if package and folder.is_relative_to(root / package)]
     waiting = [main, *(path for path in around if path.is_file())]
     while waiting:
         path = waiting.pop()
         if path in found:
             continue
-        found[path] = None
         try:
-            tree = ast.parse(path.read_bytes(), str(path))
+            found[path] = ast.parse(path.read_bytes(), str(path))
         except OSError as error:
             raise LawError(f"{path}: {error.strerror or error}") from None
         except (SyntaxError, ValueError) as error:
             raise LawError(f"{path}:{getattr(error, 'lineno', None) or 1}: is not valid Python: {error}") from None
-        waiting += _imported(tree, path, root, package)
-    return list(found)
+        waiting += _imported(found[path], path, root, package)
+    return found
 
 
 def _imported(tree: ast.Module, path: Path, root: Path, package: str) -> Iterator[Path]:
     """The local files of each import in a file, wherever in it that stands."""
-    for node in ast.walk(tree):
+    for node in _run_by_others(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield from _files_of(alias.name, root, package)
@@ -277,6 +283,17 @@ def _imported(tree: ast.Module, path: Path, root: Path, package: str) -> Iterato
             within = "" if node.level else package
             for name in dict.fromkeys([node.module or "", *(f"{node.module or ''}.{a.name}" for a in node.names)]):
                 yield from _files_of(name.strip("."), below, within)
+
+
+def _run_by_others(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes, without those that are only for a type checker, or for the file as a script."""
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.If) and _OTHERWISE & {getattr(n, "id", "") for n in ast.walk(inner.test)}:
+            for one in inner.orelse:
+                yield from (one, *_run_by_others(one))
+        else:
+            yield inner
+            yield from _run_by_others(inner)
 
 
 def _files_of(name: str, root: Path, package: str) -> Iterator[Path]:

@@ -89,7 +89,7 @@ def slowness(flight: Flight) -> Iterator[str]:
     except End as end:
         yield str(end)
         return
-    except Exception:
+    except (Exception, SystemExit):
         return
     if each > SLOW:
         whole = each * (flight.periods + 1)
