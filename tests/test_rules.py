@@ -131,3 +131,14 @@ def test_compare_and_report_say_which_rule_gave_which_numbers(tmp_path: Path) ->
     report = CliRunner().invoke(cli, ["report", str(tmp_path / "out"), "--out", str(tmp_path / "page.html")])
     assert report.exit_code == 0
     assert told in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_compare_says_which_laws_predict_on_one_plant_and_not_on_another(tmp_path: Path) -> None:
+    experiment = write(
+        tmp_path / "lead.toml",
+        '[flight]\nduration_s = 2.0\nlaw = { name = "nftsm_lead" }\n'
+        '[matrix]\nplant = ["kinematic", "lagged"]\n"law.name" = ["nftsm_lead", "lq_orbit", "smc"]\n',
+    )
+    harness.run(experiment, tmp_path / "out", workers=0)
+    told = "Predict the answer of the inner loop, but not on kinematic, which answers at once: nftsm_lead, lq_orbit."
+    assert told in harness.compare(tmp_path / "out").answer.splitlines()

@@ -266,6 +266,14 @@ def beside(airframes: Sequence[str] = AIRFRAMES) -> Iterator[Beside]:
     moderate = next(condition for condition in CONDITIONS if condition.name == "moderate turbulence")
     filtered = replace(moderate, turbulence="none", estimator=Estimator(kind="ekf"))
     nominal, wide = replace(gusty, airspeed="nominal"), replace(moderate, limit=20.0)
+    still = replace(delay, errors=Errors())
+    beyond = {
+        "200 ms of delay": replace(still, errors=Errors(command_delay=0.2)),
+        "100 ms of delay, response told 1.6 times as quick": replace(
+            still, errors=Errors(command_delay=0.1, response_speed=1.6)
+        ),
+        "course with 0.3 ° of noise": replace(still, errors=Errors(course_noise=math.radians(0.3))),
+    }
     near = 0.95 / 0.5  # the rule `behind_inner_loop` is half of the border
     flown = [
         ("`nftsm` at 0.95 of its border, 100 ms of delay", delay, "nftsm", "behind_inner_loop", near),
@@ -274,6 +282,11 @@ def beside(airframes: Sequence[str] = AIRFRAMES) -> Iterator[Beside]:
         *(
             (f"`{name}`, still air, target through the filter", filtered, name, gains, 1.0)
             for name, gains in {"nftsm": "fitted", "smc": "paper", **KNOWING}.items()
+        ),
+        *(
+            (f"`{name}`, {what}", condition, name, gains, 1.0)
+            for what, condition in beyond.items()
+            for name, gains in {"nftsm": "behind_inner_loop", **KNOWING}.items()
         ),
     ]
     for what, condition, name, gains, times in flown:

@@ -119,6 +119,7 @@ def compared(comparison: Comparison) -> Iterator[str]:
         f"{counted(comparison.flights, 'flight')}; varies: {varies or 'nothing else'}."
     )
     yield from flown.gains_by_rule(comparison.table)
+    yield from flown.predicting(comparison.table)
     yield from moved.sentences(comparison)
     yield from _lost(comparison)
     margin = comparison.pairs.other["feasibility_margin_deg_s"]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from harness.log.metric import METRICS
+from harness.plants.ladder import PLANTS
 from harness.settings.laws import loaded_kind
 from harness.tables import number, table
 from harness.verdict.comparison import Comparison
@@ -53,6 +54,16 @@ def gains_by_rule(flights: pd.DataFrame) -> Iterator[str]:
         more = f"; and {len(each) - MOST_VALUES} more" if len(each) > MOST_VALUES else ""
         rule = f"{gains}, from {kind.rules[str(gains)].base}"
         yield f"Gains of {name} by the rule {rule}: {'; '.join(each[:MOST_VALUES])}{more}."
+
+
+def predicting(flights: pd.DataFrame) -> Iterator[str]:
+    """Which laws do otherwise on one plant than on another: those that predict, where there is nothing to predict."""
+    at_once = [plant for plant in flights["plant"].unique() if plant in PLANTS and PLANTS[plant].at_once]
+    kinds = {str(name): loaded_kind(str(name)) for name in flights["law.name"].unique()}
+    laws = [name for name, kind in kinds.items() if kind and getattr(kind.value, "uses_response", False)]
+    if laws and at_once and len(at_once) < flights["plant"].nunique():
+        plants = " and ".join(at_once)
+        yield f"Predict the answer of the inner loop, but not on {plants}, which answers at once: {', '.join(laws)}."
 
 
 def _given_by_rule(row: pd.Series, decided: list[str]) -> str:
