@@ -1,7 +1,9 @@
 """A law of one's own, named by its file or module: flown, kept, and never run because somebody else's file names it."""
 
+import json
 import math
 import os
+import sqlite3
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -205,7 +207,7 @@ def test_a_law_that_fails_in_flight_is_an_outcome(tmp_path: Path, answer: str, r
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("own.py", "must be one of nftsm"), ("own.py:", "must be one of nftsm"), ("nowhere.py:Own", "no such file"),
+        ("own.py", "must be own.py:CLASS"), ("own.py:", "must be one of nftsm"), ("nowhere.py:Own", "no such file"),
         ("own.py:Onw", "there is no class Onw, it has Own - did you mean 'Own'"), ("own:Own", "there is no module own"),
         ("json:Own", "Own"), ("sys:Own", "no file of Python"), ("bad.py:Own", "bad.py:2: is not valid Python"),
         ("raises.py:Own", "raises.py:2: cannot be loaded: KeyError: 'a'"),
@@ -475,3 +477,29 @@ def test_a_worker_whose_law_hangs_or_exits_costs_that_flight_alone(tmp_path: Pat
     results = harness.run(matrix, tmp_path / "out", workers=1, log="none", timeout=1.0)
     assert list(results["outcome"]) == ["completed", "timeout", "invalid"]
     assert results["reason"][2] == "the law raised SystemExit: 5"
+
+
+@pytest.mark.parametrize("has_its_hash", [True, False])
+def test_a_foreign_journal_runs_no_file_by_naming_it(own: Path, has_its_hash: bool) -> None:
+    """Not even one that is here, and whose hash it knows: what defines no such class is no law."""
+    fly_matrix(own, Path("out"))
+    script = write(own.parent / "cleanup.py", PLAIN.partition("@dataclass")[0])
+    key, marker = harness.load_results("out")["key"][0], own.parent / "was_run"
+    hashes = {"law/cleanup.py": content_hash(script.read_bytes()), "law/leaning.py": content_hash(LEANING.encode())}
+    with sqlite3.connect("out/journal.sqlite") as journal:
+        name = "json_set(settings, '$.law.name', ?)"
+        journal.execute(
+            f"UPDATE flights SET settings = {name}", (f"{script}:Field" if has_its_hash else "cleanup:Field",)
+        )
+        ((decides,),) = journal.execute("SELECT decides FROM versions").fetchall()
+        version = json.loads(decides)
+        kept = {file: digest for file, digest in version["content"].items() if not file.startswith("law/")}
+        version["content"] = {**kept, **(hashes if has_its_hash else {})}
+        journal.execute("UPDATE versions SET decides = ?", (json.dumps(version),))
+    journal.close()
+    marker.unlink()
+    assert invoke("fly", f"out:{key}").exit_code == 2
+    for words in (("show", "out"), ("show", f"out:{key}"), ("compare", "out", "--by", "law.k"), ("view", f"out:{key}")):
+        invoke(*words, *(("--save", "a.rrd") if words[0] == "view" else ()))
+    invoke("run", own, "--out", "out", "--workers", 0, "--set", "law.name=nftsm", "--set", "law.k=[]")
+    assert not marker.exists()

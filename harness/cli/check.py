@@ -72,7 +72,7 @@ def _check_law(what: str) -> None:
     except (SyntaxError, ValueError) as error:
         raise BadInput(f"{path}:{getattr(error, 'lineno', None) or 1}: is not valid Python: {error}") from None
     if not names:
-        raise BadInput(f"{path}: it has no class with a method start; `harness init --law NAME` writes one")
+        raise BadInput(f"{path}: it has no class; `harness init --law NAME` writes one")
     wrong = []
     for name in names:
         law = absolute(f"{path}:{name}", Path())

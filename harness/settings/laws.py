@@ -205,6 +205,8 @@ def _stamps(source: Source) -> list[tuple[int, int, int]]:
 def _find(name: str) -> Source:
     where, colon, class_name = entries().get(name, name).rpartition(":")
     if not colon or not where or not class_name.isidentifier():
+        if name.endswith(".py"):
+            raise LawError(f"names a file and no class of it, must be {name}:CLASS")
         known = ", ".join([*LAWS, *entries()])
         raise LawError(f"must be one of {known}, or {FORMS}{did_you_mean(name, [*LAWS, *entries()])}")
     if where.endswith(".py"):
