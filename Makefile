@@ -64,8 +64,9 @@ laws: install  ## fly every law in every air (ten minutes on two processors): do
 	$(BIN)/harness run experiments/laws.toml --out out/laws --log none
 	$(BIN)/python -m harness.studies.which_law out/laws
 
-bench: install  ## the speed of the loop, as ratios in one run, of --help, of recordings
+bench: install  ## the speed of the loop, as ratios in one run, of the laws, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed
+	$(BIN)/python -m benchmarks.law_speed
 	$(BIN)/python -m benchmarks.help_speed
 	$(BIN)/python -m benchmarks.recording_speed
 	$(BIN)/python -m benchmarks.runs

@@ -67,7 +67,7 @@ def feed_forward_ahead(o: Observation, motion: Motion, R_d: float, v_a: float, p
         cos_t, sin_t = faster * cos(omega_t * time), faster * sin(omega_t * time)
         v_t_x, v_t_y = v_t_x * cos_t - v_t_y * sin_t, v_t_x * sin_t + v_t_y * cos_t
     x, y = x_t + x_r * cos_turned - y_r * sin_turned, y_t + x_r * sin_turned + y_r * cos_turned
-    later = Observation._make((x, y, *own, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now))
+    later = _observation((x, y, *own, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now))
     _, _, lam_dot, _, psi_a_d_dot = relative_motion(later, R_d, v_a, psi_a + (lam_dot + psi_a_d_dot) * time)
     return lam_dot + psi_a_d_dot
 
@@ -98,7 +98,7 @@ AIRSPEEDS: Mapping[str, Callable[[Observation], float]] = MappingProxyType(  # t
         "ground": lambda o: max(hypot(o.velocity_north - o.wind_north, o.velocity_east - o.wind_east), _SLOWEST),
     }
 )
-_guidance = Guidance._make  # from a tuple, in half the time of the constructor
+_guidance, _observation = Guidance._make, Observation._make  # from a tuple, in half the time of the constructor
 Reaching = Callable[[Motion], tuple[float, float, float]]  # feed-forward, rest of the command, s
 Answer = tuple[float, float, float, float, float]  # r, s, heading error, feed-forward, rest of the command
 
@@ -173,17 +173,9 @@ def mirrored(step: LawStep) -> LawStep:
 
 
 def _mirror_observation(o: Observation) -> Observation:
-    return o._replace(
-        east=-o.east,
-        velocity_east=-o.velocity_east,
-        heading=-o.heading,
-        heading_rate=-o.heading_rate,
-        bank=-o.bank,
-        roll_rate=-o.roll_rate,
-        wind_east=-o.wind_east,
-        target_east=-o.target_east,
-        target_velocity_east=-o.target_velocity_east,
-        target_turn_rate=-o.target_turn_rate,
+    x, y, v_x, v_y, v_a, psi, psi_dot, bank, p, v_n, W_x, W_y, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now = o
+    return _observation(
+        (x, -y, v_x, -v_y, v_a, -psi, -psi_dot, -bank, -p, v_n, W_x, -W_y, x_t, -y_t, v_t_x, -v_t_y, a_t, -omega_t, now)
     )
 
 
