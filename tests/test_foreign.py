@@ -49,7 +49,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def foreign(
     flown: Path,
     folder: Path,
-    settings: Callable[[dict[str, Any]], None] = lambda settings: None,
+    settings: Callable[[dict[str, Any]], object] = lambda settings: None,
     model: str = "",
 ) -> str:
     """A copy of the run as `folder`/run, with one 6-DOF row changed; `model` ends its airframe's model. Its key."""
@@ -191,6 +191,48 @@ def test_a_table_of_results_that_is_a_pipe_is_not_read(flown: Path, tmp_path: Pa
     key = foreign(flown, tmp_path)
     os.mkfifo(tmp_path / "run" / "flights.parquet")
     assert {ended.code for ended in every_command(confined, key, tmp_path).values()} == {0}
+
+
+def test_a_row_whose_law_is_code_of_somebody_else_is_shown_and_never_run(
+    flown: Path, tmp_path: Path, confined: Confined
+) -> None:
+    law = write(tmp_path / "law.py", f"open({str(tmp_path / 'ran')!r}, 'w')")
+    key = foreign(flown, tmp_path / "here", lambda row: row["law"].update(name=f"{law}:Law"))
+    ended = every_command(confined, key, tmp_path / "here")
+    for command in ("fly", "view", "plot", "export"):
+        assert "flight.law.name: " in told(ended[command])
+    for command in ("show", "show all", "compare", "report", "export all"):
+        assert ended[command].code == 0
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize("name", ["unknown", "os:system"])
+def test_a_row_with_a_law_that_is_not_here_is_shown(name: str, flown: Path, tmp_path: Path, confined: Confined) -> None:
+    key = foreign(flown, tmp_path, lambda row: row["law"].update(name=name))
+    assert "flight.law.name: " in told(confined.run(["fly", f"run:{key}"], tmp_path))
+    assert f"law {name} with gains fitted, on plant sixdof" in confined.run(["show", f"run:{key}"], tmp_path).stdout
+
+
+@pytest.mark.parametrize("name", ["..", "", ".", "/", "x/..", "a\0b", "a" * 300])
+def test_an_airframe_whose_name_no_folder_can_have_is_refused(
+    name: str, flown: Path, tmp_path: Path, confined: Confined
+) -> None:
+    key = foreign(flown, tmp_path, lambda row: row.update(aircraft=name))
+    assert told(confined.run(["fly", f"run:{key}"], tmp_path)).startswith("run: a flight has aircraft = ")
+
+
+def test_rows_without_what_every_flight_has_are_told(flown: Path, tmp_path: Path, confined: Confined) -> None:
+    changes: dict[str, Callable[[dict[str, Any]], object]] = {
+        "plant": lambda row: row.update(plant="unknown"),
+        "law.name": lambda row: row.pop("law"),
+        "aircraft": lambda row: row.pop("aircraft"),
+    }
+    for name, change in changes.items():
+        key = foreign(flown, tmp_path / name, change)
+        ended = every_command(confined, key, tmp_path / name)
+        for command in ("show", "show all", "compare", "report"):
+            assert f"{JOURNAL}: " in told(ended[command])
+            assert name in told(ended[command])
 
 
 def test_an_inner_loop_in_the_folder_of_an_airframe_is_refused(tmp_path: Path, confined: Confined) -> None:

@@ -49,7 +49,7 @@ def show(
     from harness.runs.description import description
     from harness.runs.recall import other_versions, row_address
     from harness.runs.results import load_results
-    from harness.runs.store import StoreError, find
+    from harness.runs.store import StoreError, find, taking_apart
     from harness.settings.laws import short_names
     from harness.verdict.pairs import CompareError, varying
 
@@ -61,7 +61,9 @@ def show(
     try:
         if address:
             stored = find(*address)
-            for line in description(address.folder, stored, varying(load_results(address.folder))):
+            with taking_apart(address.folder):
+                lines = list(description(address.folder, stored, varying(load_results(address.folder))))
+            for line in lines:
                 click.echo(line)
             return
         flights, others = load_results(row), other_versions(Path(row))

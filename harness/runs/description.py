@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from autopilot.laws import LAWS
 from harness.log.metric import METRICS, Value, window_in_words
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
@@ -13,7 +14,7 @@ from harness.runs.recordings import recording_path
 from harness.runs.store import Stored
 from harness.settings import document, flight_from_document
 from harness.settings.columns import by_column
-from harness.settings.laws import is_own, loaded_kind, short
+from harness.settings.laws import loaded_kind, short
 from harness.tables import number, table
 
 
@@ -128,9 +129,9 @@ def _circle(row: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
 def _own_settings(settings: Mapping[str, Any], varying: Collection[str]) -> dict[str, object]:
     """Plant, law, the settings `varying`, and every one whose value is not the default of plant and law, by its key."""
     name = settings["law"]["name"]
-    chosen = {"plant": settings["plant"], "law": {"name": "nftsm" if is_own(name) else name}}
+    chosen = {"plant": settings["plant"], "law": {"name": name if name in LAWS else "nftsm"}}
     default = document(flight_from_document(chosen))
-    if is_own(name):  # its code is not run to know its defaults
+    if name not in LAWS:  # its code is not here, or not run to know its defaults
         default["law"] = {}
     default = by_column(default)
     return {

@@ -20,6 +20,9 @@ from harness.runs.row import FlightResult, result_of
 from harness.runs.store import Stored, StoreError, content, examples, find, reading
 from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
 from harness.settings.laws import FILES, is_unchanged
+from harness.toml_text import shortened
+
+_LONGEST = 250  # bytes of a name, without its ending
 
 
 class RowAddress(NamedTuple):
@@ -68,7 +71,7 @@ def recall(place: RowAddress) -> Recalled:
     then: Mapping[str, str] = stored.version["content"]
     match settings:
         case {"target": {"track": str(track)}} if _hash(Path(track)) != then.get("target/track"):
-            name = Path(track).name
+            name = _last_name(place.folder, "target.track", track)
             settings["target"]["track"] = str(_unpacked(place.folder, {name: then.get("target/track", "")}) / name)
     match settings:
         case {"aircraft": str(name)}:
@@ -176,7 +179,7 @@ def _airframe(folder: Path, name: str, then: Mapping[str, str]) -> str:
         paths = {n: aircraft.model(now) if n == "model" else now / n for n in kept}
         if all(_hash(path) == kept[n] for n, path in paths.items()):
             return name
-    base = Path(name).name
+    base = _last_name(folder, "aircraft", name)
     return str(_unpacked(folder, {f"{base}.xml" if n == "model" else n: d for n, d in kept.items()}, base))
 
 
@@ -191,8 +194,16 @@ def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Pa
     return unpacked
 
 
+def _last_name(folder: Path, key: str, path: str) -> str:
+    """The name at the end of a path that a row has. Raises `StoreError` where no file can have it."""
+    name = Path(path).name
+    if name in ("", "..") or "\0" in path or len(name.encode(errors="replace")) > _LONGEST:
+        raise StoreError(f"{folder}: a flight has {key} = {shortened(path)!r}, which is no path of a file or a folder")
+    return name
+
+
 def _hash(path: Path) -> str | None:
     try:
         return content_hash(read(path))
-    except OSError:
+    except (OSError, ValueError):  # the latter of what is no path
         return None

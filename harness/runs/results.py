@@ -2,13 +2,15 @@
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.files import as_text, replacing
 from harness.log.metric import METRICS, YES_OR_NO
-from harness.runs.store import StoreError, last_run, reading, state
+from harness.plants.ladder import PLANTS
+from harness.plants.plant import Outcome
+from harness.runs.store import JOURNAL, StoreError, last_run, reading, state
 from harness.settings.columns import by_column, is_setting
 from harness.settings.laws import FILES
 
@@ -20,6 +22,9 @@ PARQUET = "flights.parquet"
 _AT_ONCE = 1000  # rows
 _TEXTS = ("key", "outcome", "reason", "digest")
 _NUMBERS = ("feasibility_margin_deg_s", "seconds")
+_NEEDED: Mapping[str, Collection[str]] = {  # what each flight has, and which there are, if that is known
+    "plant": PLANTS, "outcome": [outcome.value for outcome in Outcome], "law.name": (), "aircraft": (),
+}  # fmt: skip
 _STATE = b"journal_state"  # in the Parquet file's metadata: the `state` of the journal that was exported
 
 
@@ -47,7 +52,13 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         raise StoreError(
             f"{folder}: has no flight yet: its run ended before the first, or is at it; to go on: {command}"
         )
-    return as_results(_declared(table).to_pandas())
+    results = as_results(_declared(table).to_pandas())
+    for name, known in _NEEDED.items():
+        values = results[name].unique() if name in results else ["none"]
+        if unknown := [value for value in values if not (isinstance(value, str) and value in (known or [value]))]:
+            why = f"{unknown[0]}, which this harness does not know" if known else f"{unknown[0]}, must be text"
+            raise StoreError(f"{folder / JOURNAL}: cannot be used: the {name} of a flight is {why}")
+    return results
 
 
 def export(folder: Path, to: Path | None = None) -> None:

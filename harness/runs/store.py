@@ -207,17 +207,26 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
         journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=_WAIT)
         with closing(journal), closing(sqlite3.connect("")) as copy:
             journal.execute("PRAGMA query_only = ON")
+            journal.execute("PRAGMA trusted_schema = OFF")  # it may be somebody else's
             version = _format(journal, folder, thorough=False)
             if version != _FORMAT:
                 journal.backup(copy)
                 _upgrade(copy, version)
-            try:
+            with taking_apart(folder):
                 yield journal if version == _FORMAT else copy
-            except HarnessError:
-                raise
-            except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-                what = f"{type(error).__name__}: {shortened(str(error))}"
-                raise StoreError(f"{path}: is damaged: a row cannot be read ({what}); move it away") from error
+
+
+@contextmanager
+def taking_apart(folder: Path) -> Iterator[None]:
+    """For what takes rows of the journal apart: raises `StoreError` where that fails, since a row may hold anything."""
+    try:
+        yield
+    except HarnessError:
+        raise
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        what = f"{type(error).__name__}: {shortened(str(error))}"
+        why = f"{folder / JOURNAL}: is damaged: a row cannot be read ({what}); move it away"
+        raise StoreError(why) from error
 
 
 def state(journal: sqlite3.Connection) -> str:
