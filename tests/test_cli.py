@@ -1,11 +1,16 @@
 """The command line as a user meets it: real processes, real files, exit codes."""
 
+import contextlib
+import fcntl
 import json
 import os
+import pty
 import re
 import signal
+import struct
 import subprocess
 import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -15,6 +20,7 @@ from harness.cli._input import BadInput, flight_of, read_file
 from harness.cli._paths import writable, writable_folder
 from harness.cli.main import COMMANDS, Entry, load
 from harness.cli.main import harness as command_line
+from harness.log.metric import METRICS
 from tests.builders import ROOT, command, copied_airframe, invoke, python, words_of, write
 
 FILE = """\
@@ -368,3 +374,28 @@ def test_a_working_directory_that_is_gone_is_told(tmp_path: Path, words: str) ->
     )
     assert done.returncode == 2
     assert done.stderr == "the working directory no longer exists: change to another one, with cd\n"
+
+
+def on_a_terminal(columns: int, *words: object) -> list[str]:
+    """The lines that a command prints on a terminal so wide."""
+    ours, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
+    environment = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "NO_COLOR")}
+    with subprocess.Popen(words_of(*words), stdout=terminal, stderr=subprocess.DEVNULL, env=environment) as process:
+        os.close(terminal)
+        shown = b""
+        with contextlib.suppress(OSError):  # the end of what a terminal shows
+            while part := os.read(ours, 65536):
+                shown += part
+    os.close(ours)
+    assert process.returncode == 0
+    return shown.decode().splitlines()
+
+
+@pytest.mark.parametrize("columns", [80, 120, 200])
+def test_on_a_terminal_tables_fit_and_in_a_pipe_a_row_is_a_line(columns: int) -> None:
+    shown = on_a_terminal(columns, "list", "metrics")
+    assert 0.7 * columns < max(map(len, shown)) <= columns
+    assert "\x1b[" not in "".join(shown)
+    piped = command("list", "metrics").stdout.splitlines()
+    assert len(piped) == len(METRICS) + 2

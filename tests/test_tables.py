@@ -1,8 +1,10 @@
 """Tables on a terminal and in Markdown."""
 
+from collections.abc import Callable, Iterator
+
 import pytest
 
-from harness.tables import markdown, number, table
+from harness.tables import WIDTH, markdown, number, table
 
 
 def test_names_stand_left_numbers_right_and_each_heading_stands_on_its_rule() -> None:
@@ -23,6 +25,46 @@ def test_the_last_letter_counts_for_all_further_columns_and_a_table_may_lack_hea
 def test_a_table_is_never_cut() -> None:
     (line,) = table([], [["x" * 300, "y"]])
     assert line == "x" * 300 + "  y"
+
+
+@pytest.fixture
+def terminal() -> Iterator[Callable[[int], object]]:
+    """Sets the width of the terminal."""
+    token = WIDTH.set(None)
+    yield WIDTH.set
+    WIDTH.reset(token)
+
+
+WIDE = (
+    ["law", "plant", *(f"metric {i}\nm" for i in range(12))],
+    [[law, "sixdof", *map(str, range(12))] for law in "ab"],
+)
+
+
+@pytest.mark.parametrize("width", [40, 80, 120, 200])
+def test_on_a_terminal_a_wide_table_is_in_parts_that_fit_each_with_the_names_of_its_rows(
+    terminal: Callable[[int], object], width: int
+) -> None:
+    terminal(width)
+    lines = list(table(*WIDE, "llr"))
+    assert max(map(len, lines)) <= width
+    parts = "\n".join(lines).split("\n\n")
+    assert (len(parts) == 1) == (width >= 132)
+    assert [[row.split()[:2] for row in part.splitlines()[-2:]] for part in parts] == [
+        [["a", "sixdof"], ["b", "sixdof"]]
+    ] * len(parts)
+    assert " ".join(" ".join(part.splitlines()[-1].split()[2:]) for part in parts) == " ".join(NUMBERS)
+
+
+def test_on_a_terminal_a_last_column_of_text_is_wrapped_and_no_word_is_cut(terminal: Callable[[int], object]) -> None:
+    terminal(40)
+    assert list(table(["key", "meaning"], [["k2", "the gain of the reaching law " + "/path" * 9], ["k3", "-"]])) == [
+        "key  meaning",
+        "---  -----------------------------------",
+        "k2   the gain of the reaching law",
+        "     " + "/path" * 9,
+        "k3   -",
+    ]
 
 
 def test_a_table_without_rows_is_its_headings() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import shutil
 import signal
 import sys
 import warnings
@@ -17,6 +18,7 @@ from harness.cli._input import BadInput
 from harness.cli._stdout import guard
 from harness.error import HarnessError
 from harness.neighbours import in_the_way
+from harness.tables import WIDTH
 
 
 class Entry(NamedTuple):
@@ -124,6 +126,8 @@ def main() -> None:
     except FileNotFoundError:
         click.echo("the working directory no longer exists: change to another one, with cd", err=True)
         sys.exit(2)
+    if sys.stdout.isatty():
+        WIDTH.set(shutil.get_terminal_size().columns - 2)  # some tables are indented
     try:
         code = harness.main(standalone_mode=False)
     except click.ClickException as error:
