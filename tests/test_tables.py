@@ -35,10 +35,8 @@ def terminal() -> Iterator[Callable[[int], object]]:
     WIDTH.reset(token)
 
 
-WIDE = (
-    ["law", "plant", *(f"metric {i}\nm" for i in range(12))],
-    [[law, "sixdof", *map(str, range(12))] for law in "ab"],
-)
+NUMBERS = list(map(str, range(12)))
+WIDE = (["law", "plant", *(f"metric {i}\nm" for i in NUMBERS)], [[law, "sixdof", *NUMBERS] for law in "ab"])
 
 
 @pytest.mark.parametrize("width", [40, 80, 120, 200])
