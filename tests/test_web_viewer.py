@@ -19,7 +19,7 @@ from tornado.websocket import websocket_connect
 
 import harness
 from harness.review.viewer import free_port
-from tests.builders import SIXDOF, chromium, invoke, words_of
+from tests.builders import FLIGHT, SIXDOF, chromium, invoke, words_of
 
 ORANGE = (1.0, 0.57, 0.13)  # of the 6-DOF flight, within 0.1
 LEAST = 600  # pixels: some 100 are those of a warning that nothing but a processor draws here
@@ -88,6 +88,19 @@ def test_a_browser_shows_the_recording_that_is_served_on_the_loopback_address_al
             assert not viewer.is_running()
         finally:
             server.kill()
+
+
+def test_a_viewer_ends_with_a_command_that_is_killed(tmp_path: Path) -> None:
+    path = harness.record(harness.simulate(replace(FLIGHT, duration=1.0)), tmp_path / "flight.rrd")
+    words = words_of("view", path, "--web", "--port", free_port())
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as command:
+        assert command.stdout is not None
+        assert command.stdout.readline().startswith("open ")
+        (viewer,) = psutil.Process(command.pid).children()
+        command.kill()
+        command.wait()
+        psutil.wait_procs([viewer], timeout=10.0)
+        assert not viewer.is_running()
 
 
 def test_what_cannot_be_served_is_one_line(tmp_path: Path) -> None:

@@ -1,6 +1,8 @@
 """The Rerun viewer, started as a process of its own: without telemetry, listening on the loopback address only."""
 
+import ctypes
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -20,6 +22,7 @@ HOST = "127.0.0.1"
 PORT = 9876  # Rerun's default: a viewer that was opened without the harness is found there too
 RERUN = Path(rerun_cli.__file__).parent / ("rerun.exe" if os.name == "nt" else "rerun")
 WINDOW = (1600, 1000)
+_PR_SET_PDEATHSIG = 1  # of Linux: the signal that a process gets when its parent ends
 
 
 class ViewerError(HarnessError, RuntimeError):
@@ -127,7 +130,16 @@ def _at(port: int) -> list[str]:
 
 
 def _started(arguments: Sequence[str], output: int | None) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([str(RERUN), *arguments], env=quiet(), stdout=output, stderr=output)
+    """A viewer process. On Linux it ends with this one, even if that is killed."""
+    command = [str(RERUN), *arguments]
+    if not sys.platform.startswith("linux"):
+        return subprocess.Popen(command, env=quiet(), stdout=output, stderr=output)
+    libc = ctypes.CDLL(None)  # loaded before the fork
+
+    def end_with_parent() -> None:
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+    return subprocess.Popen(command, env=quiet(), stdout=output, stderr=output, preexec_fn=end_with_parent)
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
