@@ -176,6 +176,14 @@ def test_an_infeasible_search_says_what_refused_how_many_trials(file: Path, tmp_
     assert "in 4 trials: bank_peak_deg < 45 (unknown) refused 4\n" in done.stdout
 
 
+def test_flights_that_do_not_last_are_told_with_their_reason(file: Path, tmp_path: Path) -> None:
+    file.write_text(file.read_text().replace("[matrix]", "[flight.metrics]\nmonitoring_range_m = 100.0\n[matrix]"))
+    done = invoke("tune", file, "--out", tmp_path / "out", *OVER, *PEAK, "--flights", 4, "--workers", 0)
+    assert done.exit_code == 1
+    assert "outcome = completed refused 2" in done.stdout
+    assert "4 x target_lost: beyond the monitoring range, 100 m\n" in done.stdout
+
+
 def test_a_key_that_is_searched_is_no_axis_of_the_matrix() -> None:
     space = Space(read_settings(EXPERIMENTS / "gains.toml"), [dimension("law.k2=0.5:20")])
     assert len(space.conditions) == 4 * 4  # plants, and values of k3

@@ -100,12 +100,12 @@ def fly_matrix(matrix: Matrix, out: Path, options: Options) -> Progress:
     return progress
 
 
-def flown_out(flying: Iterator[Progress], out: Path) -> Progress:
-    """Flies on until all is done and shows how far it is; Ctrl-C says what is kept."""
+def flown_out(flying: Iterator[Progress], out: Path, first: str = "starting the workers") -> Progress:
+    """Flies on until all is done and shows how far it is, until then what is done `first`; Ctrl-C says what is kept."""
     import signal
 
     progress = None
-    states = of_run(flying)
+    states = of_run(flying, first)
     try:
         while (state := next(states, None)) is not None:
             progress = state

@@ -57,10 +57,10 @@ def progress(what: str, whole: float, *, counted: bool = True) -> Iterator[Advan
         yield advance
 
 
-def of_run(states: Iterable[Progress]) -> Iterator[Progress]:
-    """The states of a run, passed on as they come and shown."""
+def of_run(states: Iterable[Progress], first: str = "starting the workers") -> Iterator[Progress]:
+    """The states of a run, passed on as they come and shown; until there is one, what is done `first`."""
     if sys.stderr.isatty():
-        yield from _on_terminal(states)
+        yield from _on_terminal(states, first)
         return
     printed, state = time.monotonic(), None
     for state in states:
@@ -72,14 +72,14 @@ def of_run(states: Iterable[Progress]) -> Iterator[Progress]:
         click.echo(_line(state), err=True)
 
 
-def _on_terminal(states: Iterable[Progress]) -> Iterator[Progress]:
+def _on_terminal(states: Iterable[Progress], first: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar
 
     bar = Bar(BarColumn(), TextColumn("{task.description}"), console=Console(stderr=True), transient=True)
     with bar:
-        task = bar.add_task("starting the workers", total=None)
+        task = bar.add_task(first, total=None)
         for state in states:
             bar.update(task, total=state.total, completed=state.earlier + state.done, description=_line(state))
             yield state

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from harness.search.tune import Tuning
 
 _MOST_LINES = 30  # of a front
+_MOST_ENDINGS = 5
 
 
 @click.command()
@@ -104,7 +105,7 @@ def tune(
         options = Options(
             workers=workers, retry_failed=retry is not None, timeout=flight_timeout or TIMEOUT, typical=typical
         )
-        progress = flown_out(search.fly(out, options), out)
+        progress = flown_out(search.fly(out, options), out, "looking for settings that meet what is known beforehand")
         with busy("writing the table of flights"):
             export(out)
             best, table = write_best(search, out), write_trials(search, out)
@@ -113,6 +114,7 @@ def tune(
     except OSError as error:
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
     _print_found(search, best)
+    _print_endings(out)
     click.echo(
         f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}, all trials in "
         f"{table}"
@@ -171,6 +173,20 @@ def _print_found(search: Tuning, files: Sequence[Path]) -> None:
         if reasons := list(search.constrained(attempt)):
             click.echo(f"{file.stem} is constrained by {' and '.join(reasons)}")
     click.echo(f"next: harness fly {files[0]}")
+
+
+def _print_endings(out: Path) -> None:
+    """How flights ended that did not last, and how many did so."""
+    from harness.runs.results import load_results
+    from harness.runs.store import StoreError
+
+    try:
+        flights = load_results(out)
+    except StoreError:
+        return  # everything was refused before it was flown
+    early = flights[flights["outcome"] != "completed"]
+    for (outcome, reason), count in early.value_counts(["outcome", "reason"]).head(_MOST_ENDINGS).items():
+        click.echo(f"{count} x {outcome}: {reason}")
 
 
 def _front(search: Tuning) -> tuple[list[str], list[list[str]], str]:
