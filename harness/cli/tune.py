@@ -177,6 +177,8 @@ def _print_found(search: Tuning, files: Sequence[Path]) -> None:
 
 def _print_endings(out: Path) -> None:
     """How flights ended that did not last, and how many did so."""
+    from collections import Counter
+
     from harness.runs.results import load_results
     from harness.runs.store import StoreError
 
@@ -185,7 +187,8 @@ def _print_endings(out: Path) -> None:
     except StoreError:
         return  # everything was refused before it was flown
     early = flights[flights["outcome"] != "completed"]
-    for (outcome, reason), count in early.value_counts(["outcome", "reason"]).head(_MOST_ENDINGS).items():
+    endings = Counter(zip(early["outcome"], early["reason"], strict=True))
+    for (outcome, reason), count in endings.most_common(_MOST_ENDINGS):
         click.echo(f"{count} x {outcome}: {reason}")
 
 
