@@ -11,6 +11,7 @@ from harness.studies.does_it_hold import (
     compared,
     core,
     followed,
+    last_line,
     matrix,
     number,
     quieter,
@@ -157,3 +158,14 @@ def test_a_condition_names_flown_values_and_no_half_line(comparison: Comparison)
     texts = list(comparison.conditions["condition"])
     assert any(texts)
     assert not [text for text in texts if "≥" in text or "≤" in text or ">" in text or "<" in text]
+
+
+def test_the_last_line_says_who_keeps_the_promise_as_the_laws_were_flown(page: str) -> None:
+    assert page.endswith(f"{last_line((DOCS / 'answers' / 'which_law.csv').read_text(encoding='utf-8'))}\n")
+
+
+def test_a_law_keeps_the_promise_where_it_is_shown_to_and_an_air_without_one_is_told() -> None:
+    rows = ["condition,airframe,plant,law,keeps the promise", "still air,x,kinematic,a,", "still air,x,sixdof,a,yes"]
+    rows += ["still air,x,sixdof,b,no", '"wind, strong",x,sixdof,a,no', "still air,y,sixdof,b,yes"]
+    told = last_line("\n".join(rows)).splitlines()
+    assert told[-2:] == ["- x: still air: a; wind, strong: none is shown to.", "- y: still air: b."]

@@ -98,8 +98,11 @@ def test_the_page_says_what_was_flown_and_each_condition_by_itself(flights: "pd.
     assert "| still air | ultra_stick_25e | 2 |" in text
     assert "| moderate turbulence | ultra_stick_25e | 2 |" in text
     assert "\n\n\n" not in text
-    lines = places_csv(each).splitlines()
+    lines = places_csv(each, kept(flights)).splitlines()
     assert len(lines) == 1 + 2 * 2 * 2
+    assert [line.rsplit(",", 1)[1] for line in lines[1:] if ",sixdof," in line].count("yes") == sum(
+        map(len, kept(flights).values())
+    )
     assert all(line.startswith(("still air,", "moderate turbulence,")) for line in lines[1:])
 
 

@@ -4,6 +4,8 @@ RUN is the directory of `experiments/assumption.toml`, GAINS that of `experiment
 Every statement names its condition, its numbers and its n, and the command that repeats it.
 """
 
+import csv
+import io
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,6 +18,7 @@ from harness.files import replacing, write_text
 from harness.margins import Assess
 from harness.runs.comparable import comparable
 from harness.studies.command import out_option, run, write
+from harness.studies.which_law import KEEPS
 from harness.template import template
 from harness.verdict.answer import interval, plain, signed, unit_of
 from harness.verdict.comparison import Comparison, Scorecard, compare_flights
@@ -312,7 +315,9 @@ def short_answer(comparison: Comparison) -> Iterator[str]:
         yield f"{aircraft}: {'; '.join(clauses)} (n = {n})."
 
 
-def page(flights: "pd.DataFrame", gains: "pd.DataFrame", assess: Assess, folders: Sequence[str]) -> tuple[str, str]:
+def page(
+    flights: "pd.DataFrame", gains: "pd.DataFrame", assess: Assess, folders: Sequence[str], places: str
+) -> tuple[str, str]:
     """The page, and README's block."""
     quiet = core(flights)
     comparison = compared(quiet, assess)
@@ -337,9 +342,25 @@ def page(flights: "pd.DataFrame", gains: "pd.DataFrame", assess: Assess, folders
         "assess": assess,
         "degrees": math.degrees,
         "signs": SIGNS,
+        "last_line": last_line(places),
     }
     texts = [template("harness.studies", name).render(fields) for name in ("does_it_hold.md.jinja", "answer.md.jinja")]
     return texts[0] + "\n", texts[1].strip() + "\n"
+
+
+def keepers(places: str) -> dict[str, dict[str, list[str]]]:
+    """By airframe and condition the laws that keep the paper's promise, from the text of which_law.csv."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for row in csv.DictReader(io.StringIO(places)):
+        if row[KEEPS]:
+            laws = found.setdefault(row["airframe"], {}).setdefault(row["condition"], [])
+            laws += [row["law"]] if row[KEEPS] == "yes" else []
+    return found
+
+
+def last_line(places: str) -> str:
+    """With which law and gains the promise is kept on each airframe, in which air."""
+    return template("harness.studies", "keepers.md.jinja").render(keepers=keepers(places)).strip()
 
 
 def in_readme(readme: str, block: str) -> str:
@@ -365,13 +386,20 @@ def _folder() -> click.Path:
 @click.argument("directory", metavar="RUN", type=_folder())
 @click.argument("gains", metavar="GAINS", type=_folder())
 @click.option("--readme", type=click.Path(path_type=Path, dir_okay=False), help="Write the answer here too.")
+@click.option(
+    "--laws",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    default=Path("docs/answers/which_law.csv"),
+    show_default=True,
+    help="Which laws keep the promise, as python -m harness.studies.which_law writes it.",
+)
 @click.option("--rows", type=_folder(), help="Keep the rows of the undisturbed flights and of GAINS in this folder.")
 @out_option
-def main(directory: Path, gains: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
+def main(directory: Path, gains: Path, laws: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
     """Write OUT/does_it_hold.md from the flights of experiments/assumption.toml and quiet_gains.toml."""
     flights, assess, *_ = comparable([directory])
     of_gains = comparable([gains]).flights
-    text, block = page(flights, of_gains, assess, (str(directory), str(gains)))
+    text, block = page(flights, of_gains, assess, (str(directory), str(gains)), laws.read_text(encoding="utf-8"))
     write(out, {"does_it_hold.md": text})
     if readme is not None:
         write_text(readme, in_readme(readme.read_text(encoding="utf-8"), block))

@@ -248,19 +248,26 @@ def _drawn(of: Compared, law: str, plant: str) -> tuple[float, float] | None:
     return means[0], means[1]
 
 
-def places_csv(each: Sequence[Compared]) -> str:
-    """Every law on every plant in every condition: means and 95 % intervals, and by how many it is shown beaten."""
+KEEPS = "keeps the promise"  # of a column of which_law.csv: yes or no, of laws on the aircraft
+
+
+def places_csv(each: Sequence[Compared], keepers: Mapping[tuple[str, str], Sequence[str]]) -> str:
+    """Every law on every plant in every condition: means and 95 % intervals, and by how many it is shown beaten.
+
+    `keepers` are the laws that keep the paper's promise: see `kept`.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     numbers = [f"{name} {end}".strip() for name in (ERROR, ACTIVITY) for end in ("", "low", "high")]
-    writer.writerow(("condition", "airframe", "plant", "law", *numbers, "seeds", "laws better by error", "of"))
+    writer.writerow(("condition", "airframe", "plant", "law", *numbers, "seeds", "laws better by error", "of", KEEPS))
     for of in each:
         for plant, order in of.error.orders.items():
             for law, place in order.places.items():
                 activity = of.activity.orders[plant].places.get(law)
                 cells = [f"{x:.4g}" for p in (place, activity) if p for x in (p.mean, p.low, p.high)]
                 beaten = beaten_by(of, law, plant)
-                writer.writerow((of.condition, of.aircraft, plant, law, *cells, place.seeds, *beaten))
+                keeps = ("yes" if law in keepers[of.condition, of.aircraft] else "no") if plant == AIRCRAFT else ""
+                writer.writerow((of.condition, of.aircraft, plant, law, *cells, place.seeds, *beaten, keeps))
     return text.getvalue()
 
 
@@ -319,7 +326,7 @@ def main(directory: Path, floor: Path, out: Path) -> None:
         out,
         {
             "which_law.svg": draw(partial(paint, each=each, floors=floors), 11.0, 7.0),
-            "which_law.csv": places_csv(each),
+            "which_law.csv": places_csv(each, kept(table)),
             "which_law.md": page(table, each, list(above_floor(table, floors)), str(directory)),
         },
     )
