@@ -136,6 +136,10 @@ CALLS: Mapping[str, Sequence[str]] = {
         "MATRIX --dry-run --shard WORD", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --shard 2/3",
     ],
     "merge": ["RUN RUN --out OUT/c", "RUN WORD --out OUT/c", "RUN --out OUT", "WORD --out WORD"],
+    "map": [
+        f"FILE --out OUT {SHORT} --workers 0 --x law.k2=1:9 --y start.heading_deg=0:90 --resolution 10 --flights 130",
+        "MATRIX --out OUT --x WORD --y law.k3=0:1", "FILE --out OUT --x law.k2=1:9 --y law.k3=0:1 --of WORD",
+    ],
     "tune": [
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --minimise range_error_peak_m",
         "MATRIX --out OUT --over WORD --minimise laps", "FILE --out OUT --over law.k2=1:9 --minimise WORD",

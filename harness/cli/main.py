@@ -44,6 +44,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "merge": Entry("merge:merge", "Make one run of the parts that several machines flew."),
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
             "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
+            "map": Entry("map:map_", "Map where the answer changes over two settings."),
             "tune": Entry("tune:tune", "Search for the settings that do best."),
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },

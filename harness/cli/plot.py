@@ -97,7 +97,8 @@ def _map(folder: Path, metric: str, where: tuple[str, ...]) -> tuple[Picture, st
         raise BadInput(text if text.startswith(str(folder)) else f"{folder}: {text}") from None
     if not grids:
         raise BadInput(
-            f"{folder}: a map takes two settings with numeric values; these vary: {', '.join(varies) or '-'}"
+            f"{folder}: a map takes two settings with numeric values, flown on a grid; these vary: "
+            + (", ".join(varies) or "-")
         )
     if not any(cell.value == cell.value for each in grids for cell in each.cells.values()):
         raise BadInput(f"{folder}: no flight here has {metric}")

@@ -63,9 +63,16 @@ def report(
         comparison, origin = read_comparison(directories, overrides, by, baseline, where)
     logs = {} if markdown else _logs(list(job.to_draw(comparison, origin.folder)))
     with busy("drawing"):
-        text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin, logs)
+        text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin, logs, _maps(directories))
         write_text(path, text)
     click.echo(f"{path}")
+
+
+def _maps(directories: tuple[Path, ...]) -> dict[str, bytes]:
+    """The maps that `harness map` drew in these folders."""
+    from harness.cli.map import PICTURE
+
+    return {str(folder): path.read_bytes() for folder in directories if (path := folder / PICTURE).is_file()}
 
 
 def _logs(wanted: list[ToDraw]) -> dict[str, FlightLog]:

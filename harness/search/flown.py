@@ -2,11 +2,14 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from harness.flight import Flight
 from harness.key import identity
+from harness.provenance import provenance
 from harness.requirement import OUTCOME, Facts
-from harness.runs.run import Options, Pending, Progress, flown
+from harness.runs.matrix import Matrix
+from harness.runs.run import Options, Pending, Progress, flown, warn_of_flights_from_elsewhere
 from harness.runs.store import Store
 from harness.runs.wall_time import TimeLeft
 from harness.runs.workers import Task
@@ -21,6 +24,22 @@ class Candidate:
     foreseen: Sequence[Facts]  # of each flight
     facts: list[Facts] = field(default_factory=list)  # of each flight, once it is flown
     keys: list[str] = field(default_factory=list)
+
+
+def fly_search(
+    batches: Iterable[Sequence[Candidate]], matrix: Matrix, folder: Path, options: Options, progress: Progress
+) -> Iterator[Progress]:
+    """Flies the batches of a search over this matrix, whose flights are kept in `folder`: see `fly_batches`.
+
+    What is kept there is not flown again: the same search goes on where it stopped. Raises `StoreError` and
+    `WorkersError`.
+    """
+    file, experiment = matrix.file, matrix.experiment
+    with Store(folder) as store:
+        warn_of_flights_from_elsewhere(store)
+        store.begin(provenance(file.path, file.text, experiment.title, experiment.question))
+        yield from fly_batches(batches, store, options, progress)
+        store.end()
 
 
 def fly_batches(

@@ -4,8 +4,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from harness.requirement import foreseen
-from harness.runs.matrix import Matrix, read_matrix
-from harness.search.dimension import OPTION, Dimension, SearchError
+from harness.runs.matrix import Combination, Matrix, read_matrix
+from harness.search.dimension import Dimension, SearchError
 from harness.search.flown import Candidate
 from harness.settings import SettingsFile, overridden
 
@@ -17,12 +17,12 @@ class Space:
         """Raises `SettingsError` and `SearchError`."""
         for i, one in enumerate(dimensions):
             if one.key in [other.key for other in dimensions[:i]]:
-                raise SearchError(f"{OPTION} {one}: {one.key} is given twice")
+                raise SearchError(f"{one.option} {one}: {one.key} is given twice")
             if text := file.overrides.get(("flight", *one.key.split("."))):
-                raise SearchError(f"{OPTION} {one}: {text} gives it one value: leave one of them out")
+                raise SearchError(f"{one.option} {one}: {text} gives it one value: leave one of them out")
         self.dimensions = dimensions
         lowest = {d.key: d.low for d in dimensions}
-        self.matrix = read_matrix(_with(file, lowest))  # a key that is searched is no axis of it
+        self.matrix = read_matrix(self._with(file, lowest))  # a key that is searched is no axis of it
         self.conditions = list(self.matrix.combinations())
 
     @property
@@ -35,10 +35,18 @@ class Space:
         """The settings in the middle of every range."""
         return self.candidate(self._middle)
 
-    def candidate(self, values: Mapping[str, float], names: Collection[str] = ()) -> Candidate:
-        """These settings, ready to be flown, with what is foreseen by these names. Raises `SettingsError`."""
+    def candidate(
+        self,
+        values: Mapping[str, float],
+        names: Collection[str] = (),
+        conditions: Sequence[Combination] | None = None,
+    ) -> Candidate:
+        """These settings, ready to be flown over the conditions, all unless told, with what is foreseen by these names.
+
+        Raises `SettingsError`.
+        """
         matrix = self._at(values)
-        flights = [matrix.flight(condition) for condition in self.conditions]
+        flights = [matrix.flight(condition) for condition in (self.conditions if conditions is None else conditions)]
         return Candidate(values, flights, [foreseen(flight, names) for flight in flights])
 
     @property
@@ -46,8 +54,9 @@ class Space:
         return {d.key: d.rounded(0.5 * (d.low + d.high)) for d in self.dimensions}
 
     def _at(self, values: Mapping[str, float]) -> Matrix:
-        return replace(self.matrix, file=_with(self.matrix.file, values))
+        return replace(self.matrix, file=self._with(self.matrix.file, values))
 
-
-def _with(file: SettingsFile, values: Mapping[str, float]) -> SettingsFile:
-    return overridden(file, [f"{key}={value!r}" for key, value in values.items()], OPTION)
+    def _with(self, file: SettingsFile, values: Mapping[str, float]) -> SettingsFile:
+        for d in self.dimensions:
+            file = overridden(file, [f"{d.key}={values[d.key]!r}"], d.option)
+        return file

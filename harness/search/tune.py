@@ -10,12 +10,10 @@ from typing import NamedTuple
 
 from harness.error import SettingsError, did_you_mean
 from harness.log.metric import METRICS
-from harness.provenance import provenance
 from harness.requirement import OUTCOME, Facts, Requirement
-from harness.runs.run import Options, Progress, warn_of_flights_from_elsewhere
-from harness.runs.store import Store
+from harness.runs.run import Options, Progress
 from harness.search.dimension import SearchError
-from harness.search.flown import Candidate, fly_batches
+from harness.search.flown import Candidate, fly_search
 from harness.search.sampler import Ask, Sampler
 from harness.search.space import Space
 
@@ -56,12 +54,7 @@ class Tuning:
         What is kept there is not flown again: the same search goes on where it stopped. Raises `StoreError` and
         `WorkersError`.
         """
-        file, experiment = self.space.matrix.file, self.space.matrix.experiment
-        with Store(folder) as store:
-            warn_of_flights_from_elsewhere(store)
-            store.begin(provenance(file.path, file.text, experiment.title, experiment.question))
-            yield from fly_batches(self.batches(), store, options, self.progress)
-            store.end()
+        yield from fly_search(self.batches(), self.space.matrix, folder, options, self.progress)
 
     def batches(self) -> Iterator[Sequence[Candidate]]:
         """The candidates to be flown next; each batch is judged before the next one is asked for."""

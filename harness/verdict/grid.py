@@ -16,6 +16,7 @@ DEFAULT = ("chatters", "range_error_rms_m")  # drawn where none is asked for
 ROUNDING = 1e-6  # of any metric: no map of rounding noise
 BEYOND = "*"  # marks a cell in which a limit cycle is predicted
 _MOST_GRIDS = 12
+_FLOWN = 0.25  # of a map's cells, at least: `harness map` and searches fly points that are on no grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +93,8 @@ def maps(
         there = flights.iloc[by_place[place]]
         at = {axis: values[axis][i] for axis, i in zip(fixed, place, strict=True)}
         cells = {(row, column): _cell(rows, metric) for (row, column), rows in there.groupby([first, second])}
-        if cells:
-            rows, columns = ((axis, ordered(there[axis])) for axis in (first, second))
+        rows, columns = ((axis, ordered(there[axis])) for axis in (first, second))
+        if len(cells) >= _FLOWN * len(rows[1]) * len(columns[1]):
             found.append(Grid(metric, at, rows, columns, cells))
     return found
 

@@ -64,8 +64,13 @@ class Listed(NamedTuple):
     drawing: str  # both flights as an SVG; empty where they are not at hand
 
 
-def page(comparison: Comparison, origin: Origin, logs: Mapping[str, FlightLog] = MappingProxyType({})) -> str:
-    """The HTML page; `logs` by key: flights of `to_draw` that are at hand."""
+def page(
+    comparison: Comparison,
+    origin: Origin,
+    logs: Mapping[str, FlightLog] = MappingProxyType({}),
+    maps: Mapping[str, bytes] = MappingProxyType({}),
+) -> str:
+    """The HTML page; `logs` by key: flights of `to_draw` that are at hand; `maps` by folder: pictures, SVG."""
     added = list(_disturbances(comparison)) if comparison.by == "plant" else []
     judged_parts = [part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)]
     return template("harness.verdict", "report.html.jinja").render(
@@ -82,6 +87,7 @@ def page(comparison: Comparison, origin: Origin, logs: Mapping[str, FlightLog] =
         most_lines=MOST_LINES,
         grids=[each for metric in grid.DEFAULT for each in grid.grids(comparison, metric)[::-1]][:MOST_GRIDS],
         folder=origin.folder,
+        maps={folder: base64.b64encode(picture).decode() for folder, picture in maps.items()},
         axes={axis: answer.values(values) for axis, values in comparison.axes.items()},
         margins=written(comparison.assess),
         drawings=lambda card: list(_intervals(card)) if card in comparison.answering else [],
