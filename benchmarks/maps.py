@@ -1,7 +1,8 @@
-"""What `harness map` finds with how many flights: python -m benchmarks.maps [--flights]. The latter writes docs/answers/maps.md.
+"""What `harness map` finds with how many flights: python -m benchmarks.maps [--flights].
 
 Planted borders are held against their full grids, and against a quadtree that divides every square to the last step.
-With --flights a map of the kinematic aircraft is held against its grid, and one on 6-DOF is timed: ten minutes.
+With --flights a map of the kinematic aircraft is held against its grid, and one on 6-DOF is timed
+(ten minutes), and docs/answers/maps.md is written.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_cdt
 
 import harness
+from harness.files import write_text
 from harness.log.metric import measure
 from harness.runs.run import Options
 from harness.search.border import Answer, Border

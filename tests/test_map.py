@@ -236,7 +236,7 @@ def test_a_mistake_is_one_line_that_says_what_is_allowed(file: Path, words: list
 
 
 def test_ctrl_c_keeps_what_was_flown_and_the_same_command_goes_on(tmp_path: Path) -> None:
-    file, out = write(tmp_path / "long.toml", BASIN.format(duration=300)), tmp_path / "out"
+    file, out = write(tmp_path / "long.toml", BASIN.format(duration=150)), tmp_path / "out"
     words = words_of("map", file, "--out", out, *OVER, "--resolution", 10, "--workers", 2)
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     until(lambda: runs_of(out), process)

@@ -30,7 +30,7 @@ MOST_PANELS = 12
 LEAST, MOST = 10, 2000  # of the resolution
 _SHARE = 10  # of the full grid's flights: a search takes one in so many at most, unless told
 _DIGITS = 7  # of a setting: steps of a map are small
-_PREDICTED = 11  # points along each side, between which the predicted margin is interpolated
+_PREDICTED = 9  # points along each side, between which the predicted margin is interpolated
 
 
 @dataclass(frozen=True, slots=True)
