@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from benchmarks import flight_speed, help_speed, recording_speed, runs
+from benchmarks import flight_speed, help_speed, maps, recording_speed, runs
 from tests.builders import drawing
 
 
@@ -43,6 +43,18 @@ def test_many_flights_are_timed_with_one_worker_and_two(capsys: pytest.CaptureFi
     assert medians(sixdof)[0] > 0.0
     assert medians(cost)
     assert resumed.startswith("50 rows: ")
+
+
+def test_maps_are_held_against_full_grids_and_a_quadtree(capsys: pytest.CaptureFixture[str]) -> None:
+    maps.main(trials=1)
+    rows = [line.split(" | ") for line in lines(capsys) if line.startswith("| ")]
+    planted = rows[1 : 1 + len(maps.PLANTED)]
+    for _, flights, share, quadtree, _, off in planted:
+        assert int(flights) < int(quadtree)
+        assert share.startswith("1/")
+        assert off == "0.00 % |"
+    assert rows[len(planted) + 2][0] == "| 0.06"
+    assert rows[len(planted) + 2][1] == "100 %"
 
 
 @drawing

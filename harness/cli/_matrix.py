@@ -163,6 +163,23 @@ def _print_results(matrix: Matrix, out: Path, progress: Progress) -> None:
     click.echo(f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}")
 
 
+def print_endings(out: Path) -> None:
+    """How flights ended that did not last, and how many did so."""
+    from collections import Counter
+
+    from harness.runs.results import load_results
+    from harness.runs.store import StoreError
+
+    try:
+        flights = load_results(out)
+    except StoreError:
+        return  # everything was refused before it was flown
+    early = flights[flights["outcome"] != "completed"]
+    endings = Counter(zip(early["outcome"], early["reason"], strict=True))
+    for (outcome, reason), count in endings.most_common(_MOST_REASONS):
+        click.echo(f"{count} x {outcome}: {reason}")
+
+
 def counted(number: int, noun: str) -> str:
     """`1 flight`, `2 flights`."""
     return f"{number} {noun}{'s' if number != 1 else ''}"

@@ -70,7 +70,7 @@ def map_(
           --y start.heading_deg=0:360 --set plant=kinematic
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import flown_out, print_survey, processes, surveyed
+    from harness.cli._matrix import flown_out, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.drawing import save
@@ -110,6 +110,7 @@ def map_(
     except OSError as error:
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
     _print_found(found)
+    print_endings(out)
     click.echo(
         f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}, the map in "
         f"{out / _PICTURES[0]}"

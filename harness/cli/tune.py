@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from harness.search.tune import Tuning
 
 _MOST_LINES = 30  # of a front
-_MOST_ENDINGS = 5
 
 
 @click.command()
@@ -77,7 +76,7 @@ def tune(
           --minimise range_error_peak_m --minimise convergence_time_s --subject-to 'range_error_peak_m < 5'
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import flown_out, print_survey, processes, surveyed
+    from harness.cli._matrix import flown_out, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
@@ -114,7 +113,7 @@ def tune(
     except OSError as error:
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
     _print_found(search, best)
-    _print_endings(out)
+    print_endings(out)
     click.echo(
         f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}, all trials in "
         f"{table}"
@@ -173,23 +172,6 @@ def _print_found(search: Tuning, files: Sequence[Path]) -> None:
         if reasons := list(search.constrained(attempt)):
             click.echo(f"{file.stem} is constrained by {' and '.join(reasons)}")
     click.echo(f"next: harness fly {files[0]}")
-
-
-def _print_endings(out: Path) -> None:
-    """How flights ended that did not last, and how many did so."""
-    from collections import Counter
-
-    from harness.runs.results import load_results
-    from harness.runs.store import StoreError
-
-    try:
-        flights = load_results(out)
-    except StoreError:
-        return  # everything was refused before it was flown
-    early = flights[flights["outcome"] != "completed"]
-    endings = Counter(zip(early["outcome"], early["reason"], strict=True))
-    for (outcome, reason), count in endings.most_common(_MOST_ENDINGS):
-        click.echo(f"{count} x {outcome}: {reason}")
 
 
 def _front(search: Tuning) -> tuple[list[str], list[list[str]], str]:
