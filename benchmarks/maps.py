@@ -20,7 +20,7 @@ import harness
 from harness.files import write_text
 from harness.log.metric import measure
 from harness.runs.run import Options
-from harness.search.border import Answer, Border
+from harness.search.border import Answer, BorderSearch
 from harness.search.dimension import dimension
 from harness.search.map import Map, map_of, question
 from harness.search.picture import drawn
@@ -60,9 +60,9 @@ PLANTED: dict[str, Planted] = {
 }
 
 
-def searched(planted: Planted) -> Border:
+def searched(planted: Planted) -> BorderSearch:
     """The border found."""
-    border = Border.of(SIDE)
+    border = BorderSearch.of(SIDE)
     while asked := border.asked():
         for x, y in asked:
             border.answers[x, y] = planted(x / border.side, y / border.side)
@@ -71,7 +71,7 @@ def searched(planted: Planted) -> Border:
 
 def quadtree(planted: Planted) -> int:
     """The flights of a quadtree on the same coarse points, which divides each square whose corners differ."""
-    border = Border.of(SIDE)
+    border = BorderSearch.of(SIDE)
     answers: dict[tuple[int, int], bool] = {}
 
     def visit(x: int, y: int, side: int) -> None:

@@ -14,7 +14,7 @@ import pytest
 import harness
 from harness.log.metric import measure
 from harness.requirement import OUTCOME
-from harness.search.border import Answer, Border, lines
+from harness.search.border import Answer, BorderSearch, lines
 from harness.search.dimension import dimension
 from harness.search.map import Map, map_of, question
 from harness.search.picture import drawn
@@ -75,15 +75,15 @@ PLANTED: dict[str, Planted] = {
 }
 
 
-def located(planted: Planted, resolution: int = 200) -> Border:
-    border = Border.of(resolution)
+def located(planted: Planted, resolution: int = 200) -> BorderSearch:
+    border = BorderSearch.of(resolution)
     while asked := border.asked():
         for x, y in asked:
             border.answers[x, y] = planted(x / border.side, y / border.side)
     return border
 
 
-def grid(planted: Planted, border: Border) -> np.ndarray[tuple[int, ...], np.dtype[np.object_]]:
+def grid(planted: Planted, border: BorderSearch) -> np.ndarray[tuple[int, ...], np.dtype[np.object_]]:
     steps = [i / border.side for i in range(border.side + 1)]
     return np.array([[planted(u, v) for u in steps] for v in steps], dtype=object)
 

@@ -78,7 +78,7 @@ class Scale(NamedTuple):
 
 
 @dataclass(slots=True)
-class Border:
+class BorderSearch:
     """A search for the border of an answer over a square, by asking and telling."""
 
     side: int  # steps along each side of the lattice
@@ -88,7 +88,7 @@ class Border:
     _is_scaled: bool = False
 
     @classmethod
-    def of(cls, resolution: int) -> "Border":
+    def of(cls, resolution: int) -> "BorderSearch":
         """A search that locates a border to 1/`resolution` of the side, at least."""
         squares = max(_LEAST, -(-resolution // _DIVIDED))
         steps = 1

@@ -19,7 +19,7 @@ from harness.plants.plant import Outcome
 from harness.requirement import OUTCOME, Facts, RequirementError, requirement
 from harness.runs.matrix import Combination
 from harness.runs.run import Options, Progress
-from harness.search.border import Answer, Border, Point, lines
+from harness.search.border import Answer, BorderSearch, Point, lines
 from harness.search.dimension import Dimension, SearchError
 from harness.search.flown import Candidate, fly_search
 from harness.search.space import Space
@@ -76,12 +76,12 @@ def _of_result(answer: Callable[[Facts], Answer]) -> Callable[[Facts], Answer]:
 
 
 @dataclass(slots=True)
-class Panel:
+class MapPanel:
     """One combination of the matrix: its flights differ in the two settings, and in what is drawn from the seed."""
 
     at: Mapping[str, object]  # of what varies in the matrix
     conditions: Sequence[Combination]
-    border: Border
+    border: BorderSearch
     keys: dict[Point, Sequence[str]] = field(default_factory=dict)  # of the flights of a point
     refused: dict[Point, str] = field(default_factory=dict)  # why a point is no flight
 
@@ -102,7 +102,7 @@ class Map:
 
     space: Space
     question: Question
-    panels: Sequence[Panel]
+    panels: Sequence[MapPanel]
     flights: int  # at most
     progress: Progress
     stopped: bool = False  # at this number, before the borders were located
@@ -145,12 +145,12 @@ class Map:
                 panel.keys[point] = made.keys
                 panel.border.answers[point] = self.question.over(made.facts)
 
-    def values(self, panel: Panel, point: tuple[float, float]) -> Mapping[str, float]:
+    def values(self, panel: MapPanel, point: tuple[float, float]) -> Mapping[str, float]:
         """The two settings at a point."""
         shares = (step / panel.border.side for step in point)
         return {d.key: d.value(share, _DIGITS) for d, share in zip(self.space.dimensions, shares, strict=True)}
 
-    def _candidate(self, panel: Panel, point: Point) -> Candidate | None:
+    def _candidate(self, panel: MapPanel, point: Point) -> Candidate | None:
         """The flights of a point; None where the settings refuse them, which is an unknown answer."""
         try:
             return self.space.candidate(self.values(panel, point), (), panel.conditions)
@@ -159,14 +159,14 @@ class Map:
             panel.border.answers[point] = None
             return None
 
-    def predicted(self, panel: Panel) -> NDArray[np.float64] | None:
+    def predicted(self, panel: MapPanel) -> NDArray[np.float64] | None:
         """The margin to the predicted limit cycle, by row (y) and column (x) of evenly spread points; None: unknown."""
         side = panel.border.side
         steps = [side * i / (_PREDICTED - 1) for i in range(_PREDICTED)]
         margins = np.array([[self._margin(panel, (x, y)) for x in steps] for y in steps])
         return None if np.isnan(margins).all() else margins
 
-    def _margin(self, panel: Panel, point: tuple[float, float]) -> float:
+    def _margin(self, panel: MapPanel, point: tuple[float, float]) -> float:
         try:
             (flight, *_) = self.space.candidate(self.values(panel, point), (), panel.conditions[:1]).flights
         except SettingsError:
@@ -174,7 +174,7 @@ class Map:
         margin = predicted_margin(flight)
         return math.nan if margin is None else margin
 
-    def told(self, panel: Panel) -> str:
+    def told(self, panel: MapPanel) -> str:
         """The share of each answer over the area of a panel, of a number its least and its largest; in words."""
         filled = panel.border.filled().ravel().tolist()
         numbers = [answer for answer in filled if isinstance(answer, float)]
@@ -206,10 +206,10 @@ def map_of(space: Space, asked: Question, *, resolution: int, flights: int | Non
     """A map, not begun. Raises `SearchError`."""
     if not LEAST <= resolution <= MOST:
         raise SearchError(f"--resolution is {resolution}, must be from {LEAST} to {MOST}")
-    panels: dict[str, Panel] = {}
+    panels: dict[str, MapPanel] = {}
     for condition in space.conditions:
         at = {k: v for k, v in condition.values.items() if k != "seed" and k not in condition.drawn}
-        panel = panels.setdefault(repr(at), Panel(at, [], Border.of(resolution)))
+        panel = panels.setdefault(repr(at), MapPanel(at, [], BorderSearch.of(resolution)))
         panel.conditions = [*panel.conditions, condition]
     if len(panels) > MOST_PANELS:
         raise SearchError(f"the [matrix] has {len(panels)} combinations, and a map {MOST_PANELS} panels at most: --set")

@@ -20,7 +20,7 @@ from harness.log.metric import METRICS
 from harness.requirement import OUTCOME
 from harness.search.border import Answer, lines
 from harness.search.dimension import Dimension
-from harness.search.map import CONVERGED, Map, Panel
+from harness.search.map import CONVERGED, Map, MapPanel
 from harness.settings.catalogue import TABLES, keys_of
 from harness.settings.keys import vector_of
 from harness.verdict.figures import BORDER, MOST_ACROSS, SHADES, UNKNOWN
@@ -102,7 +102,7 @@ def _scale(answers: Sequence[Answer]) -> Normalize:
 
 
 def _panel(
-    axes: Axes, found: Map, panel: Panel, words: Sequence[Answer], scale: Normalize | None, shown_lines: set[str]
+    axes: Axes, found: Map, panel: MapPanel, words: Sequence[Answer], scale: Normalize | None, shown_lines: set[str]
 ) -> None:
     border, side = panel.border, panel.border.side
     axes.set_facecolor(UNKNOWN)
@@ -161,7 +161,7 @@ def _exact(dimension: Dimension, share: float) -> float:
     return dimension.value(share, digits=12)
 
 
-def _place(found: Map, panel: Panel, point: tuple[float, float]) -> tuple[float, float]:
+def _place(found: Map, panel: MapPanel, point: tuple[float, float]) -> tuple[float, float]:
     x, y = (step / panel.border.side for step in point)
     return _exact(found.x, x), _exact(found.y, y)
 
