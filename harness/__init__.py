@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from harness.error import ArgumentError, HarnessError, RecordingError, SettingsError
     from harness.flight import Flight, InnerLoop, MetricSettings
     from harness.flight_errors import Errors
-    from harness.interface import law, metrics, read_flight, record, run, simulate
+    from harness.interface import law, metrics, read_flight, record, run, show, simulate
     from harness.log import FlightLog
     from harness.margins import Assess
     from harness.plants.plant import Outcome, PlantError, Start
@@ -83,6 +83,7 @@ __all__ = [
     "read_flight",
     "record",
     "run",
+    "show",
     "simulate",
 ]
 
@@ -94,7 +95,7 @@ _HOMES = {
     "harness.error": ["ArgumentError", "HarnessError", "RecordingError", "SettingsError"],
     "harness.flight": ["Flight", "InnerLoop", "MetricSettings"],
     "harness.flight_errors": ["Errors"],
-    "harness.interface": ["law", "metrics", "read_flight", "record", "run", "simulate"],
+    "harness.interface": ["law", "metrics", "read_flight", "record", "run", "show", "simulate"],
     "harness.log": ["FlightLog"],
     "harness.margins": ["Assess"],
     "harness.plants.plant": ["Outcome", "PlantError", "Start"],

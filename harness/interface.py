@@ -108,6 +108,18 @@ def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title:
     return path
 
 
+def show(log: FlightLog, *others: FlightLog) -> Any:
+    """What a notebook shows of one flight, or of several over each other: see `FlightLog.show`."""
+    from harness.log.figure import named
+    from harness.review.notebook import viewer
+
+    try:
+        logs = named((log, *others))
+        return viewer(logs, ", ".join(logs)) or log.plot(*others)
+    except ValueError as error:
+        raise ArgumentError(str(error)) from None
+
+
 def read_flight(path: str | Path, flight: str | None = None) -> "pd.DataFrame":
     """The log of a recorded flight, bit for bit as `FlightLog.frame()` gave it: one row per guidance period.
 

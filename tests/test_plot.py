@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from rerun import notebook
 
 from harness.drawing import COLOURS
+from harness.error import ArgumentError
 from harness.log import FlightLog
 from harness.log.figure import PANELS, command_spectrum, picture
 from harness.log.signals import Signals
@@ -139,3 +141,19 @@ def test_bad_input_is_one_line(words: list[str], said: str, out: Path, tmp_path:
     assert done.exit_code == 2
     assert said.format(out=out).removeprefix("--save a.jpg: ") in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_without_the_notebook_support_of_rerun_a_notebook_shows_the_picture(pair: dict[str, FlightLog]) -> None:
+    if notebook.HAS_NOTEBOOK:
+        pytest.skip("it is installed here")
+    one, other = pair.values()
+    shown, drawn = one.show(other), one.plot(other)
+    assert [axes.get_title() for axes in shown.axes] == [axes.get_title() for axes in drawn.axes]
+    with pytest.raises(ArgumentError):
+        one.show(*[other] * 7)
+
+
+def test_with_it_a_notebook_shows_the_viewer(pair: dict[str, FlightLog]) -> None:
+    pytest.importorskip("rerun_notebook")
+    one, other = pair.values()
+    assert isinstance(one.show(other), notebook.Viewer)

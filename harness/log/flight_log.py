@@ -3,7 +3,8 @@
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,6 +141,16 @@ class FlightLog:
         import pandas as pd
 
         return pd.DataFrame(self.whole, columns=self.columns, copy=True)
+
+    def show(self, *others: "FlightLog") -> Any:
+        """In a notebook the viewer inside the page, with `others` over this flight, in the layout of a recording.
+
+        That takes Rerun's notebook support, `pip install 'standoff-harness[notebook]'`; without it the picture of
+        `plot`. The last expression of a cell shows itself. `ArgumentError` for what cannot be drawn.
+
+        >>> harness.simulate(flight).show()
+        """
+        return import_module("harness.interface").show(self, *others)  # the viewer stands above the log
 
     def plot(self, *others: "FlightLog", panels: Sequence[str] = ()) -> "Figure":
         """A matplotlib figure of this flight, and of `others` over it, up to six in all, in the size of print.

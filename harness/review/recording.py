@@ -122,10 +122,18 @@ def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: 
 
 def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     """The content of the file, made in memory: Rerun's own file sink never returns when the disk is full."""
-    flights = styled({as_text(name): log for name, log in logs.items()})
-    content = content_of(flights, list(lanes_by_flight({flight.name: flight.log for flight in flights})))
     to = Recorder()
     memory = to.stream.memory_recording()
+    log_flights(to, logs, title, notes, command)
+    data = memory.drain_as_bytes()
+    to.stream.disconnect()
+    return data
+
+
+def log_flights(to: Recorder, logs: Logs, title: str, notes: str = "", command: str = "") -> None:
+    """Logs flights by name with their layout: see `write_recording`."""
+    flights = styled({as_text(name): log for name, log in logs.items()})
+    content = content_of(flights, list(lanes_by_flight({flight.name: flight.log for flight in flights})))
     to.stream.set_log_time_enabled(False)
     to.once("/notes/checksum", rr.TextDocument(TEXT))
     to.layout(layout(content))
@@ -140,6 +148,3 @@ def _encoded(logs: Logs, title: str, notes: str, command: str) -> bytes:
     for plot in (*content.overview, *content.differences, *content.aircraft, *content.target):
         log_series(to, plot)
     log_story(to, flights, title, notes, command)
-    data = memory.drain_as_bytes()
-    to.stream.disconnect()
-    return data
