@@ -2,13 +2,17 @@
 
 import os
 import shutil
+import sqlite3
 import subprocess
+from contextlib import closing
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import harness
 from harness.runs.results import versions
+from harness.runs.store import JOURNAL
 from tests.builders import (
     MATRIX,
     ROOT,
@@ -20,6 +24,8 @@ from tests.builders import (
     words_of,
     write,
 )
+
+JOURNALS = Path(__file__).parent / "journals"  # as earlier versions wrote them
 
 
 @pytest.fixture
@@ -58,6 +64,39 @@ def test_rows_of_another_version_are_marked(file: Path, tmp_path: Path, monkeypa
         assert any(line.startswith(f"{key[:8]}{'*' if seed == 0 else ' '}") for line in lines)
     assert lines[-1].startswith("* flown by another version: physics ")
     assert lines[-1].endswith(" (here 99); the same command flies it anew")
+
+
+@pytest.mark.parametrize(("form", "metrics"), [(1, 2), (2, 5)])
+def test_a_journal_of_an_earlier_format_is_read_compared_flown_and_run_on(
+    form: int, metrics: int, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    with closing(sqlite3.connect(out / JOURNAL)) as journal:
+        journal.executescript((JOURNALS / f"format_{form}.sql").read_text(encoding="utf-8"))
+    before = (out / JOURNAL).read_bytes()
+    keys = digests(out)
+    assert len(keys) == 2
+    shown = invoke("show", out)
+    assert shown.exit_code == 0
+    assert "* flown by another version: " in shown.stdout
+    for key in keys:
+        assert invoke("show", f"{out}:{key}").exit_code == 0
+    for words in (["compare", out], ["report", out, "--out", tmp_path / "report.html"]):
+        with pytest.warns(UserWarning, match=f"flown with version {metrics} of the metrics, of which this harness has"):
+            assert invoke(*words).exit_code == 0
+    table = tmp_path / "table.csv"
+    assert invoke("export", out, "--to", "csv", "--out", table).exit_code == 0
+    assert len(pd.read_csv(table)) == 2
+    for key, plant in zip(keys, ("kinematic", "sixdof"), strict=True):
+        if plant == "kinematic" or form == 1:  # the other journal came without the files of its airframe
+            assert invoke("fly", f"{out}:{key}", "--json").exit_code == 0
+    assert (out / JOURNAL).read_bytes() == before
+    with closing(sqlite3.connect(out / JOURNAL)) as journal:
+        ((settings,),) = journal.execute("SELECT settings FROM runs").fetchall()
+    progress = fly_matrix(write(tmp_path / "m.toml", settings), out, "seed=0")
+    assert progress.done == 2
+    assert keys.items() <= digests(out).items()
 
 
 def append(path: Path, text: str) -> None:

@@ -1,10 +1,12 @@
 """The flights of one run, or of several, that may be compared, and the margins that judge them."""
 
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from harness import key
 from harness.margins import Assess
 from harness.runs.recall import load_laws
 from harness.runs.results import load_results, versions
@@ -29,15 +31,19 @@ def comparable(folders: Sequence[Path], by: str | None = None, overrides: Sequen
     """The flights of these directories; `overrides`: assess.KEY=VALUE.
 
     With `by` = `DIRECTORY` a flight may be in each of them, and their versions may differ. Raises `SettingsError`;
-    `StoreError` without results, or when flights of different versions would be mixed.
+    `StoreError` without results, or when flights of different versions would be mixed. Flights of earlier physics or
+    metrics are a warning.
     """
     import pandas as pd
 
     question, assess = _asked(folders[0], overrides)
     for folder in folders:
         load_laws(folder)
+    known = [versions(folder) for folder in folders]
+    for folder, of in zip(folders, known, strict=True):
+        _warn_of_earlier(folder, of)
     if len(folders) == 1:
-        _refuse_mixed(versions(folders[0]), str(folders[0]))
+        _refuse_mixed(known[0], str(folders[0]))
         return Comparable(load_results(folders[0]), assess, question)
     names = list(map(str, folders))
     if len(set(names)) < len(names):
@@ -46,7 +52,6 @@ def comparable(folders: Sequence[Path], by: str | None = None, overrides: Sequen
         [load_results(folder).assign(**{DIRECTORY: name}) for folder, name in zip(folders, names, strict=True)],
         ignore_index=True,
     )
-    known = [versions(folder) for folder in folders]
     if by == DIRECTORY:
         for of, name in zip(known, names, strict=True):
             _refuse_mixed(of, name)
@@ -82,6 +87,17 @@ def _refuse_mixed(of: dict[str, dict[str, int]], place: str) -> None:
             f"{place}: its flights are of different versions, which a comparison must not mix: {'; '.join(mixed)}. "
             "Fly them again into another directory"
         )
+
+
+def _warn_of_earlier(folder: Path, of: Mapping[str, Mapping[str, int]]) -> None:
+    for what, now in (("physics", key.PHYSICS_VERSION), ("metrics", key.METRICS_VERSION)):
+        if then := [version for version in of.get(what, ()) if version != str(now)]:
+            warnings.warn(
+                f"{folder}: flown with version {' and '.join(then)} of the {what}, of which this harness has version "
+                f"{now}: values have moved; the same command flies them anew: {last_run(folder)['command']}",
+                UserWarning,
+                stacklevel=3,
+            )
 
 
 def _given(words: Sequence[str]) -> Iterator[str]:
