@@ -83,7 +83,8 @@ def _holding_course_rates(R_d: float, v_a: float, wind: Array, target_velocity: 
 def margins_in_flight(flight: Flight, wind: Array, target_velocity: Array) -> Array:
     """The limit minus the rate needed to hold the circle in each wind round each target, as `needed_rates`."""
     needed = needed_rates(flight, wind, target_velocity)
-    return np.where(np.isfinite(needed), flight.law.max_heading_rate - needed, -np.inf)
+    least = np.full_like(needed, -np.inf)
+    return np.subtract(flight.law.max_heading_rate, needed, out=least, where=np.isfinite(needed))
 
 
 def feasibility_margin(flight: Flight) -> float:

@@ -91,3 +91,8 @@ def test_on_6_dof_a_law_comes_back_as_well_to_a_target_that_overtook_it(name: st
     assert np.abs(log["heading_rate_command"]).max() <= LIMIT
     assert np.ptp(np.unwrap(log["heading"][800:1800])) < math.tau
     assert np.abs(log["range_error"][-200:]).max() < 1.0
+
+
+def test_round_a_target_that_outruns_a_law_without_a_limit_the_margin_is_minus_infinity() -> None:
+    flight = replace(FLIGHT, law=law("nftsm", max_heading_rate=math.inf), target=Target(speed=13.5), duration=1.0)
+    assert (simulate(flight)["feasibility_margin"] == -math.inf).all()
