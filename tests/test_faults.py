@@ -25,9 +25,10 @@ import harness
 from autopilot.guidance import Guidance, LawStep, Observation
 from harness.review.reading import read_logs
 from harness.runs.recordings import recording_path
+from harness.runs.results import export
 from harness.runs.store import JOURNAL, Store, StoreError, reading
 from harness.runs.workers import Task, WorkerResult, fly_task
-from tests.builders import WORKERS, OwnLaw, command, digests, fly_matrix, turning, words_of, write
+from tests.builders import WORKERS, OwnLaw, command, digests, fly_matrix, invoke, turning, words_of, write
 
 KINEMATIC = """\
 [flight]
@@ -414,6 +415,29 @@ def test_a_damaged_journal_is_told_and_left_as_it_is(tmp_path: Path, how: str) -
     assert "nothing was changed" in done.stderr
     assert "Traceback" not in done.stderr
     assert (out / JOURNAL).read_bytes() == before
+
+
+@pytest.mark.parametrize("how", ["cut", "overwritten"])
+def test_a_damaged_journal_is_told_by_what_only_reads(tmp_path: Path, how: str) -> None:
+    out = tmp_path / "out"
+    fly_matrix(settings(tmp_path, count=30), out)
+    export(out)  # so that the flights themselves are read elsewhere
+    damage(out / JOURNAL, how)
+    for call in (["show"], ["compare", "--by", "seed"], ["report"], ["export", "--to", "csv", "--out", tmp_path / "a"]):
+        done = invoke(call[0], out, *call[1:])
+        assert done.exit_code == 2
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"{out / JOURNAL}: is damaged")
+
+
+def test_without_workers_a_limit_for_a_flight_that_hangs_is_refused(tmp_path: Path) -> None:
+    file = settings(tmp_path, count=1)
+    done = invoke("run", file, "--out", tmp_path / "out", "--workers", 0, "--flight-timeout", 5)
+    assert done.exit_code == 2
+    (line,) = done.stderr.splitlines()
+    assert "--flight-timeout" in line
+    assert "--workers" in line
+    assert not (tmp_path / "out").exists()
 
 
 def test_settings_changed_in_between_are_new_flights_and_the_old_stay(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
     >>> results.query("plant == 'sixdof'").groupby("law.name")["range_error_rms_m"].median()
     """
     folder = Path(folder)
-    with reading(folder) as journal:
+    with reading(folder, thorough=True) as journal:
         table = _exported(folder / PARQUET, state(journal))
         if table is None:
             table = _table(journal)
@@ -66,7 +66,7 @@ def export(folder: Path, to: Path | None = None) -> None:
     import pyarrow.parquet as pq
 
     path = to or folder / PARQUET
-    with reading(folder) as journal:
+    with reading(folder, thorough=to is not None) as journal:
         now = state(journal)
         if _is_current(path, now):
             return

@@ -193,10 +193,11 @@ class Store:
 
 
 @contextmanager
-def reading(folder: Path) -> Iterator[sqlite3.Connection]:
+def reading(folder: Path, *, thorough: bool = False) -> Iterator[sqlite3.Connection]:
     """The journal, open for reading, also while a run writes to it; one of an earlier format as an upgraded copy.
 
-    Raises `StoreError`; also where what is done with it fails, since that is to take its rows apart.
+    With `thorough` all of it is checked for damage, also what is not read. Raises `StoreError`; also where what is done
+    with it fails, since that is to take its rows apart.
     """
     path = folder / JOURNAL
     if not path.is_file():
@@ -208,7 +209,7 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
         with closing(journal), closing(sqlite3.connect("")) as copy:
             journal.execute("PRAGMA query_only = ON")
             journal.execute("PRAGMA trusted_schema = OFF")  # it may be somebody else's
-            version = _format(journal, folder, thorough=False)
+            version = _format(journal, folder, thorough=thorough)
             if version != _FORMAT:
                 journal.backup(copy)
                 _upgrade(copy, version)
