@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import errno
+import gc
 import itertools
 import os
 import random
@@ -18,8 +19,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import psutil
 import pytest
+from pebble.pool.channel import WorkerChannel
 
 import harness
 from autopilot.guidance import Guidance, LawStep, Observation
@@ -28,7 +31,7 @@ from harness.runs.recordings import recording_path
 from harness.runs.results import export
 from harness.runs.store import JOURNAL, Store, StoreError, reading
 from harness.runs.workers import Task, WorkerResult, fly_task
-from tests.builders import WORKERS, OwnLaw, command, digests, fly_matrix, invoke, turning, words_of, write
+from tests.builders import WORKERS, OwnLaw, command, digests, fly_matrix, invoke, python, turning, words_of, write
 
 KINEMATIC = """\
 [flight]
@@ -173,6 +176,26 @@ def test_a_worker_that_is_killed_from_outside_is_one_row(tmp_path: Path) -> None
     assert Counter(harness.load_results(tmp_path / "out")["outcome"]) == {"completed": 2, "worker_died": 1}
 
 
+def die_with_the_lock(task: Task, folder: Path) -> WorkerResult:
+    """Flies, but for one flight, where the worker is killed while it has the lock that it shares with the others."""
+    if task.position == 3:
+        (channel,) = (each for each in gc.get_objects() if isinstance(each, WorkerChannel))
+        channel.mutex.reader_mutex.acquire()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fly_task(task, folder)
+
+
+def test_workers_that_wait_for_a_lock_of_a_dead_one_are_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.runs.workers._STALLED", 1.0)
+    file = settings(tmp_path, count=200)
+    progress = fly_matrix(file, tmp_path / "out", options=replace(WORKERS, fly=die_with_the_lock))
+    assert (progress.done, progress.failed) == (200, 1)
+    outcomes = harness.load_results(tmp_path / "out")["outcome"].tolist()
+    assert outcomes == ["worker_died" if i == 3 else "completed" for i in range(200)]
+
+
 def hang(task: Task, folder: Path) -> WorkerResult:
     """Flies, but for three flights, whose law does not come back: it computes, sleeps, or lets no signal through."""
     endless: dict[int, Callable[[], object]] = {
@@ -234,6 +257,41 @@ def test_a_machine_without_time_for_the_workers_changes_no_result(how: str, tmp_
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     assert digests(tmp_path / "out") == digests(tmp_path / "undisturbed")
+
+
+def killed_before_a_file_is_whole(*words: object) -> None:
+    """Runs the command and kills it when it has written a file's content, before that has its name."""
+    code = (
+        "import os, pathlib, sys\n"
+        "from harness.cli.main import main\n"
+        "pathlib.Path.replace = lambda *_: os.kill(os.getpid(), 9)\n"
+        f"sys.argv = {['harness', *map(str, words)]!r}\n"
+        "main()\n"
+    )
+    assert python(code).returncode == -signal.SIGKILL
+
+
+def test_a_parent_killed_while_it_writes_the_table_or_the_report_leaves_none_that_is_half(tmp_path: Path) -> None:
+    text = settings(tmp_path, count=4).read_text().replace("[matrix]", '[matrix]\nplant = ["kinematic", "lagged"]')
+    file, out = write(tmp_path / "matrix.toml", text), tmp_path / "out"
+    fly_matrix(file, tmp_path / "undisturbed")
+    run = ["run", file, "--out", out, "--workers", 0, "--log", "none"]
+    killed_before_a_file_is_whole(*run)
+    assert not (out / "flights.parquet").exists()
+    kept = digests(out)
+    assert kept == digests(tmp_path / "undisturbed")
+    done = invoke(*run)
+    assert done.exit_code == 0
+    assert "0 flown, 8 earlier, 0 failed" in done.stdout
+    assert len(pd.read_parquet(out / "flights.parquet")) == 8
+    assert digests(out) == kept
+    killed_before_a_file_is_whole("report", out)
+    assert not (out / "report.html").exists()
+    assert invoke("report", out).exit_code == 0
+    whole = (out / "report.html").read_text(encoding="utf-8")
+    assert whole.rstrip().endswith("</html>")
+    killed_before_a_file_is_whole("report", out)
+    assert (out / "report.html").read_text(encoding="utf-8") == whole
 
 
 def test_ctrl_c_ends_within_two_seconds_with_130_and_no_process_left(tmp_path: Path) -> None:
