@@ -141,6 +141,18 @@ def test_a_recording_read_whole_is_the_flights_that_were_written(
         assert (read.flight, read.outcome, read.digest) == (log.flight, log.outcome, log.digest)
 
 
+def test_a_recording_without_seal_that_ends_the_process_that_reads_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.rrd"
+    write_recording(path, {"a": simulate(replace(FLIGHT, duration=1.0))}, "A title")
+    path.write_bytes(path.read_bytes().replace(b"CHECKSUM:", b"UNSEALED:"))
+    read_recording(path)
+    monkeypatch.setattr("harness.review.reading._CHILD", "import os; os.abort()")
+    with pytest.raises(ValueError, match=r"a\.rrd: is damaged: the process that read it ended with exit code -6"):
+        read_recording(path)
+
+
 def test_every_recording_takes_its_seal() -> None:
     """What Rerun draws at random in each must not meet a part of the placeholder: then that would be compressed."""
     for _ in range(400):

@@ -1,7 +1,11 @@
 """Reading a recording back: the log of each flight to the last bit, and the flight that it was."""
 
 import json
+import os
+import pickle
 import re
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,12 +19,13 @@ from harness.files import is_text
 from harness.flight import Flight
 from harness.log import COLUMNS, FlightLog
 from harness.plants.plant import Outcome
-from harness.review.seal import check
+from harness.review.seal import is_sealed
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+_CHILD = "import pathlib, sys; from harness.review.reading import send; send(pathlib.Path(sys.argv[1]))"
 
 
 class _Held(NamedTuple):
@@ -84,7 +89,37 @@ def _chosen(path: Path, names: list[str], flight: str | None) -> str:
 
 
 def _read(path: Path) -> dict[str, _Held]:
-    check(path)  # first, for the OSError: Rerun raises RuntimeError for all that is wrong with a file
+    # The seal first, for the OSError: Rerun raises RuntimeError for all that is wrong with a file.
+    return _held(path) if is_sealed(path) else _held_by_child(path)
+
+
+def _held_by_child(path: Path) -> dict[str, _Held]:
+    """The same, read in a process of its own: a damaged file may end the process that reads it."""
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", _CHILD, str(path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode:
+        raise ValueError(f"{path}: is damaged: the process that read it ended with exit code {done.returncode}")
+    held = pickle.loads(done.stdout)  # of our own child
+    if isinstance(held, str):
+        raise ValueError(held)
+    known: dict[str, _Held] = held
+    return known
+
+
+def send(path: Path) -> None:
+    """Writes what a recording holds, or what is wrong with it, to standard output, for the process that asked."""
+    try:
+        held: object = _held(path)
+    except ValueError as error:
+        held = str(error)
+    sys.stdout.buffer.write(pickle.dumps(held))
+
+
+def _held(path: Path) -> dict[str, _Held]:
     try:
         with path.open("rb") as file:
             name = str(path) if is_text(path) else f"/dev/fd/{file.fileno()}"  # Rerun knows no other names

@@ -23,20 +23,21 @@ def sealed(content: bytes) -> bytes:
     return before + _MARK + _checksum(content) + after
 
 
-def check(path: Path) -> None:
-    """Raises OSError when the file cannot be read, ValueError when it is not as it was sealed; one without seal passes.
+def is_sealed(path: Path) -> bool:
+    """Whether the file has a seal, which recordings of earlier versions have not.
 
-    Recordings of earlier versions have no seal.
+    Raises OSError when the file cannot be read, ValueError when it is not as it was sealed.
     """
     content = read(path)
     before, mark, after = content.partition(_MARK)
     if not mark:
-        return
+        return False
     found, after = after[: len(_NONE)], after[len(_NONE) :]
     if _MARK in after:
         raise ValueError(f"{path}: is several recordings in one file, must be one")
     if found != _checksum(before + PLACEHOLDER + after):
         raise ValueError(f"{path}: is damaged, or was changed by another program: its checksum is another")
+    return True
 
 
 def _checksum(content: bytes) -> bytes:
