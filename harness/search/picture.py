@@ -1,7 +1,7 @@
 """The picture of a map: a panel for each combination, the border, the flights, and the predicted limit cycle."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -146,7 +146,14 @@ def _panel(
         shown_lines.add("cycle")
     axes.set_xlim(found.x.low, found.x.high)
     axes.set_ylim(found.y.low, found.y.high)
-    axes.set_title("\n".join(f"{key} = {shown(value)}" for key, value in panel.at.items()), fontsize="small")
+    axes.set_title("\n".join(f"{key} = {shown(value)}" for key, value in _at(found, panel).items()), fontsize="small")
+
+
+def _at(found: Map, panel: MapPanel) -> dict[str, object]:
+    """What a panel is of: the plant always."""
+    flight = found.space.matrix.file.document["flight"]
+    plant = {"plant": flight["plant"]} if isinstance(flight, Mapping) and "plant" in flight else {}
+    return {**plant, **panel.at}
 
 
 def _cycle(axes: Axes, found: Map, margins: NDArray[np.float64]) -> None:
@@ -176,7 +183,7 @@ def _patches(found: Map, words: Sequence[Answer]) -> list[Patch]:
         for fill, word in zip(_FILLS, words, strict=False)
     ]
     if any(answer is None for panel in found.panels for answer in panel.border.answers.values()):
-        patches.append(Patch(fc=UNKNOWN, ec=INK, lw=0.4, label="unknown"))
+        patches.append(Patch(fc=UNKNOWN, ec=INK, lw=0.4, label="none" if found.question.is_number else "unknown"))
     return patches
 
 
