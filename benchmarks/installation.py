@@ -1,19 +1,24 @@
 """The wheel installed by pip, without the source tree: `python -m benchmarks.installation [PYTHON]`.
 
 Sizes of the wheel and of the environment, and the time of a first flight whose files are in no memory: as installed,
-and without the byte code that pip made. Needs the package registry; takes a minute or two.
+and without the byte code that pip made; written into the guide. Needs the package registry; takes a minute or two.
 """
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks.help_speed import seconds
+from harness.files import write_text
 
 ROOT = Path(__file__).parents[1]
 FLIGHT = ROOT / "experiments" / "stationary.toml"
+GUIDE = ROOT / "docs" / "guide" / "first_flight.md"
+MEASURED = re.compile(r"(<!-- measured -->\n).*?(<!-- /measured -->)", re.DOTALL)
 LARGEST = 3  # packages named
 
 
@@ -39,8 +44,8 @@ def forget(folder: Path) -> None:
         os.close(opened)
 
 
-def main(python: str = sys.executable) -> None:
-    """Print the sizes, and the times."""
+def lines(python: str) -> Iterator[str]:
+    """The sizes and the times, as lines of a list."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         wheel, there = build(folder), folder / "environment"
@@ -48,15 +53,24 @@ def main(python: str = sys.executable) -> None:
         pip = [str(there / "bin" / "pip"), "--quiet", "--disable-pip-version-check", "install", str(wheel)]
         subprocess.run(pip, check=True, cwd=folder)
         (packages,) = there.glob("lib/python*/site-packages")
-        print(f"{packages.parent.name}: wheel {wheel.stat().st_size / 1e3:.0f} kB, environment {size(there):.0f} MB")
+        version = packages.parent.name.replace("python", "Python ")
+        yield f"{version}: the wheel has {wheel.stat().st_size / 1e3:.0f} kB, the environment {size(there):.0f} MB."
         largest = sorted(filter(Path.is_dir, packages.iterdir()), key=size)[: -LARGEST - 1 : -1]
-        print(f"the largest: {', '.join(f'{path.name} {size(path):.0f} MB' for path in largest)}")
+        yield f"The largest packages: {', '.join(f'`{path.name}` {size(path):.0f} MB' for path in largest)}."
         fly = [str(there / "bin" / "harness"), "fly", str(FLIGHT)]
         for how, before in (("as installed", []), ("without byte code", list(packages.rglob("*.pyc")))):
             for file in before:
                 file.unlink()
             forget(there)
-            print(f"first flight, cold, {how}: {seconds(fly):.2f} s; the next {seconds(fly):.2f} s")
+            yield f"A first flight from a cold disk, {how}: {seconds(fly):.2f} s; the next {seconds(fly):.2f} s."
+
+
+def main(python: str = sys.executable) -> None:
+    """Write the sizes and the times into the guide, and print them."""
+    block = "".join(f"- {line}\n" for line in lines(python))
+    text = GUIDE.read_text(encoding="utf-8")
+    write_text(GUIDE, MEASURED.sub(lambda found: f"{found[1]}{block}{found[2]}", text))
+    print(block, end="")
 
 
 if __name__ == "__main__":
