@@ -45,6 +45,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
             "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
             "map": Entry("map:map_", "Map where the answer changes over two settings."),
+            "falsify": Entry("falsify:falsify", "Search for the flight that breaks a requirement most."),
             "tune": Entry("tune:tune", "Search for the settings that do best."),
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },

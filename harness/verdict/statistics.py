@@ -229,3 +229,8 @@ def share(true: NDArray[np.bool_], seeds: NDArray[np.generic], *, drawn: bool) -
     low = float(stats.beta.ppf(tail, k, independent - k + 1.0)) if number else 0.0
     high = float(stats.beta.ppf(1.0 - tail, k + 1.0, independent - k)) if number < of else 1.0
     return Share(number, of, n, low, high)
+
+
+def upper_bound(number: int, of: int) -> float:
+    """The one-sided 95 % upper bound on a proportion (Clopper and Pearson), of independent draws."""
+    return float(stats.beta.ppf(CONFIDENCE, number + 1.0, of - number)) if number < of else 1.0

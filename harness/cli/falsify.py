@@ -1,0 +1,184 @@
+"""`harness falsify`: the flight that breaks a requirement most."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from harness.search.falsify import Falsification
+
+_MOST_LINES = 5  # of the table of the worst
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--over", multiple=True, required=True, metavar="KEY=LO:HI", help="Search this setting; repeatable.")
+@click.option("--requirement", "asked", required=True, metavar="'NAME OP VALUE'", help="What a flight is to break.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="The folder of the results.")
+@click.option(
+    "--flights", type=click.IntRange(1), default=200, show_default=True, metavar="N", help="At most N flights."
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search, not of the flights.")
+@click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
+@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
+@click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the text.")
+def falsify(
+    file: Path,
+    over: tuple[str, ...],
+    asked: str,
+    out: Path,
+    flights: int,
+    seed: int,
+    workers: int | None,
+    overrides: tuple[str, ...],
+    retry: str | None,
+    flight_timeout: float | None,
+    as_json: bool,
+) -> None:
+    """Search for the flight that breaks a requirement most.
+
+    The requirement is NAME OP VALUE: a metric, or the outcome, against a value. How robust a flight is, is its distance
+    from that value over the value; below 0 it breaks the requirement. What a flight does not have breaks it as well.
+    Each trial is flown over all flights of the [matrix] of FILE, and judged by the worst of them; a key that is
+    searched is no axis of it.
+
+    At least every fourth trial is a uniform draw from the ranges (of their logarithms, where a positive range of a
+    decade or more is searched by factors). They give a 95 % upper bound on the share of the ranges that breaks the
+    requirement. That none was found proves nothing.
+
+    Writes OUT/counterexample.toml, which `harness fly` takes, and OUT/trials.csv. The result does not depend on the
+    number of workers. The same command resumes an interrupted search, and goes on with more --flights; the flights are
+    rows of OUT as of `harness run`. Exit code 0 whether a counter-example is found or not; 1 when a flight failed
+    (invalid, timeout, worker_died).
+
+    \b
+    Examples:
+      harness falsify experiments/falsify.toml --out out/falsify --over start.heading_deg=0:360 \\
+          --over target.speed_mps=0:6 --requirement 'range_error_peak_m < 5'
+      harness falsify experiments/falsify.toml --out out/lost --over target.speed_mps=0:12 \\
+          --requirement 'outcome = completed'
+    """
+    from harness.cli._input import BadInput
+    from harness.cli._matrix import flown_out, print_survey, processes, surveyed
+    from harness.cli._paths import writable_folder
+    from harness.cli._progress import busy
+    from harness.error import HarnessError
+    from harness.requirement import RequirementError, requirement
+    from harness.runs.results import export
+    from harness.runs.run import Options
+    from harness.runs.workers import TIMEOUT
+    from harness.search.dimension import dimension
+    from harness.search.falsify import falsification
+    from harness.search.files import write_counterexample, write_probes
+    from harness.search.space import Space
+    from harness.settings import read_settings
+
+    workers = processes(workers, flight_timeout)
+    try:
+        required = requirement(asked)
+    except RequirementError as error:
+        raise BadInput(f"--requirement {asked!r}: {error}") from None
+    try:
+        space = Space(read_settings(file, overrides), [dimension(text) for text in over])
+        search = falsification(space, required, flights=flights, seed=seed)
+        _, middle, _ = (surveyed(matrix) for matrix in space.tried)
+        writable_folder(out)
+        if not as_json:
+            print_survey(space.matrix, middle, 0)
+            click.echo("every trial flies these; searched:")
+            for one in space.dimensions:
+                click.echo(f"  {one}{', by factors' if one.is_log else ''}")
+            click.echo(f"to be broken: {required}")
+        trials = flights // len(space.conditions)
+        typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
+        options = Options(
+            workers=workers, retry_failed=retry is not None, timeout=flight_timeout or TIMEOUT, typical=typical
+        )
+        progress = flown_out(search.fly(out, options), out)
+        with busy("writing the table of flights"):
+            export(out)
+            counterexample, table = write_counterexample(search, out), write_probes(search, out)
+    except HarnessError as error:
+        raise BadInput(str(error)) from None
+    except OSError as error:
+        raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
+    if as_json:
+        click.echo(_json(search, counterexample))
+    else:
+        _print_found(search, out, counterexample)
+        click.echo(
+            f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}, all "
+            f"trials in {table}"
+        )
+    raise SystemExit(1 if progress.failed else 0)
+
+
+def _print_found(search: Falsification, out: Path, counterexample: Path | None) -> None:
+    """The worst trials, the counter-example or that there is none, and what the uniform trials say."""
+    from collections import Counter
+
+    from harness.cli._matrix import counted
+    from harness.tables import table
+
+    keys = [dimension.key for dimension in search.space.dimensions]
+    name = search.requirement.name
+    listed = search.broken[:_MOST_LINES] or ([search.worst] if search.worst else [])
+    rows = []
+    for trial in listed:
+        settings = [f"{trial.candidate.values[key]:g}" for key in keys]
+        rows.append([*settings, search.value(trial), f"{trial.robustness:.3g}", trial.candidate.keys[trial.decisive]])
+    for line in table([*keys, name, "robustness", "flight"], rows, "r" * (len(keys) + 2) + "l"):
+        click.echo(line)
+    flown = counted(len(search.trials), "trial")
+    if len(search.space.conditions) > 1:
+        flown += f" of {counted(len(search.space.conditions), 'flight')}"
+    if counterexample:
+        click.echo(f"{len(search.broken)} of {flown} broke it, trial {search.first_broken} as the first")
+        if all(trial.candidate.facts[trial.decisive].get(name) is None for trial in search.trials):
+            click.echo(f"warning: {name} is unknown in every flight, which breaks any requirement on it", err=True)
+    else:
+        click.echo(f"none in {flown}; above is the one that came closest" if listed else f"none in {flown}")
+    for what, count in Counter(search.refused).most_common(_MOST_LINES):
+        click.echo(f"{counted(count, 'trial')} refused before it was flown: {what}")
+    bound = search.bound
+    failed = f", and {bound.failed} failed and count as broken" if bound.failed else ""
+    click.echo(
+        f"{bound.broken} of {counted(bound.trials, 'uniform trial')} broke it{failed}: with 95 % confidence at most "
+        f"{bound.share:.2%} of the ranges does"
+    )
+    if counterexample:
+        click.echo(f"next: harness fly {counterexample}, or harness view {out}:{_key(search)}")
+
+
+def _key(search: Falsification) -> str:
+    """The beginning of the key of the counter-example."""
+    return search.broken[0].candidate.keys[search.broken[0].decisive][:12]
+
+
+def _json(search: Falsification, counterexample: Path | None) -> str:
+    import json
+
+    worst, bound = search.worst, search.bound
+    found = worst and {
+        "settings": dict(worst.candidate.values),
+        "value": worst.candidate.facts[worst.decisive].get(search.requirement.name),
+        "robustness": worst.robustness,
+        "flight": worst.candidate.keys[worst.decisive],
+    }
+    return json.dumps(
+        {
+            "requirement": str(search.requirement),
+            "trials": len(search.trials),
+            "broken": len(search.broken),
+            "first_broken": search.first_broken,
+            "worst": found,
+            "counterexample": counterexample and str(counterexample),
+            "uniform": {**bound._asdict()},
+        },
+        allow_nan=False,
+    )

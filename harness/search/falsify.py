@@ -1,0 +1,143 @@
+"""Which settings break a requirement most: a search that tells the prober how robust each trial is."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from harness.error import SettingsError
+from harness.plants.plant import Outcome
+from harness.requirement import OUTCOME, Requirement
+from harness.runs.run import Options, Progress
+from harness.search.dimension import SearchError
+from harness.search.flown import Candidate, fly_search
+from harness.search.prober import Probe, Prober
+from harness.search.space import Space
+from harness.search.tune import AT_ONCE, PATIENCE
+from harness.verdict.statistics import upper_bound
+
+_REFUSED = 1.0  # robustness, for the prober alone, of settings that no flight can have
+_UNKNOWN = -1.0  # robustness of a number that a flight does not have, as of a truth value that is wrong
+
+
+class Trial(NamedTuple):
+    """Settings that were flown, and how robust the worst of their flights is."""
+
+    candidate: Candidate
+    uniform: bool  # drawn uniformly from the ranges
+    robustness: float | None  # below 0 the requirement is broken; None: a flight failed, so that nothing is known
+    broken: bool
+    decisive: int  # the condition in which it does worst
+
+
+class Bound(NamedTuple):
+    """What the uniform trials say of the share of the ranges in which the requirement is broken."""
+
+    trials: int
+    broken: int
+    failed: int  # of them a flight failed: they count as broken
+    share: float  # at most, with 95 % confidence
+
+
+@dataclass(slots=True, kw_only=True)
+class Falsification:
+    """A search for the settings that break a requirement most, and its trials so far."""
+
+    space: Space
+    requirement: Requirement
+    flights: int  # at most
+    seed: int
+    trials: list[Trial]
+    refused: list[str]  # the first line of what is wrong, of settings that no flight can have
+    progress: Progress
+
+    def fly(self, folder: Path, options: Options) -> Iterator[Progress]:
+        """Searches, and yields the progress: see `fly_search`."""
+        yield from fly_search(self.batches(), self.space.matrix, folder, options, self.progress)
+
+    def batches(self) -> Iterator[Sequence[Candidate]]:
+        """The candidates to be flown next; each batch is judged before the next one is asked for."""
+        prober = Prober(len(self.space.dimensions), self.seed)
+        conditions = len(self.space.conditions)
+        count, size = self.flights // conditions, -(-AT_ONCE // conditions)
+        while len(self.trials) < count:
+            batch: list[tuple[Probe, bool, Candidate]] = []
+            while len(batch) < min(size, count - len(self.trials)):
+                uniform = prober.is_uniform(len(self.trials) + len(batch))
+                asked = self._asked(prober, uniform)
+                if asked is None:
+                    break
+                batch.append((asked[0], uniform, asked[1]))
+            if not batch:
+                return
+            yield [candidate for _, _, candidate in batch]
+            for probe, uniform, candidate in batch:
+                trial = self._judged(candidate, uniform)
+                self.trials.append(trial)
+                if trial.robustness is not None:
+                    prober.tell(probe, trial.robustness)
+            if self.worst:
+                self.progress.note = f"{len(self.broken)} broken, worst {self.value(self.worst)}"
+
+    def _asked(self, prober: Prober, uniform: bool) -> tuple[Probe, Candidate] | None:
+        """Settings that a flight can have; None when none are found."""
+        names = [self.requirement.name] if self.requirement.is_foreseen else []
+        for _ in range(PATIENCE):
+            probe = prober.ask(uniform)
+            values = {d.key: d.value(x) for d, x in zip(self.space.dimensions, probe.at.tolist(), strict=True)}
+            try:
+                return probe, self.space.candidate(values, names)
+            except SettingsError as error:
+                prober.tell(probe, _REFUSED)
+                self.refused.append(error.lines[0])
+        return None
+
+    def _judged(self, candidate: Candidate, uniform: bool) -> Trial:
+        distances = [self.requirement.distance(facts) for facts in candidate.facts]
+        distances = [x if math.isfinite(x) else _UNKNOWN for x in distances]
+        decisive = distances.index(min(distances))
+        if any(Outcome(facts[OUTCOME]).failed for facts in candidate.facts):
+            return Trial(candidate, uniform, None, False, decisive)
+        broken = not all(map(self.requirement.is_met, candidate.facts))
+        return Trial(candidate, uniform, distances[decisive], broken, decisive)
+
+    @property
+    def worst(self) -> Trial | None:
+        """The trial that breaks the requirement most, or comes closest to that; the earliest of equal ones."""
+        known = [trial for trial in self.trials if trial.robustness is not None]
+        return min(known, key=lambda trial: (not trial.broken, trial.robustness), default=None)
+
+    @property
+    def broken(self) -> Sequence[Trial]:
+        """The trials that break the requirement, the worst first."""
+        return sorted((t for t in self.trials if t.broken), key=lambda trial: trial.robustness or 0.0)
+
+    @property
+    def bound(self) -> Bound:
+        """The upper bound on the share of the ranges that breaks the requirement."""
+        drawn = [trial for trial in self.trials if trial.uniform]
+        failed = sum(trial.robustness is None for trial in drawn)
+        broken = sum(trial.broken for trial in drawn)
+        return Bound(len(drawn), broken, failed, upper_bound(broken + failed, len(drawn)))
+
+    @property
+    def first_broken(self) -> int | None:
+        """The number of the first trial that broke the requirement, from 1."""
+        return next((i for i, trial in enumerate(self.trials, start=1) if trial.broken), None)
+
+    def value(self, trial: Trial) -> str:
+        """What the requirement is about, in the trial's worst flight."""
+        fact = trial.candidate.facts[trial.decisive].get(self.requirement.name)
+        return "unknown" if fact is None else f"{fact:.4g}" if isinstance(fact, float) else str(fact).lower()
+
+
+def falsification(space: Space, requirement: Requirement, *, flights: int, seed: int = 0) -> Falsification:
+    """A search, not begun. Raises `SearchError`."""
+    conditions = len(space.conditions)
+    if flights < conditions:
+        raise SearchError(f"--flights is {flights}, must be {conditions} at least, which is one trial")
+    return Falsification(
+        space=space, requirement=requirement, flights=flights, seed=seed, trials=[], refused=[],
+        progress=Progress(flights // conditions * conditions),
+    )  # fmt: skip
