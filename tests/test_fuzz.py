@@ -135,6 +135,12 @@ CALLS: Mapping[str, Sequence[str]] = {
         "MATRIX --out RUN --limit 8 --workers 0 --log none", "MATRIX --dry-run --limit WORD",
         "MATRIX --dry-run --shard WORD", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --shard 2/3",
     ],
+    "falsify": [
+        f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement WORD",
+        f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement range_error_peak_m<5 --json",
+        "MATRIX --out OUT --over WORD --requirement laps>1",
+        "FILE --out OUT --over law.k2=1:9 --requirement outcome=WORD",
+    ],
     "merge": ["RUN RUN --out OUT/c", "RUN WORD --out OUT/c", "RUN --out OUT", "WORD --out WORD"],
     "map": [
         f"FILE --out OUT {SHORT} --workers 0 --x law.k2=1:9 --y start.heading_deg=0:90 --resolution 10 --flights 130",

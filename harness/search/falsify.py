@@ -97,7 +97,7 @@ class Falsification:
         distances = [self.requirement.distance(facts) for facts in candidate.facts]
         distances = [x if math.isfinite(x) else _UNKNOWN for x in distances]
         decisive = distances.index(min(distances))
-        if any(Outcome(facts[OUTCOME]).failed for facts in candidate.facts):
+        if any(Outcome(str(facts[OUTCOME])).failed for facts in candidate.facts):
             return Trial(candidate, uniform, None, False, decisive)
         broken = not all(map(self.requirement.is_met, candidate.facts))
         return Trial(candidate, uniform, distances[decisive], broken, decisive)

@@ -1,0 +1,103 @@
+"""A search for the flight that breaks a requirement: planted failures, real ones, and what is said of none."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import harness
+from benchmarks.planted_failures import flights_needed, needed_at_random
+from harness.settings import load_flight
+from harness.verdict.statistics import upper_bound
+from tests.builders import command, invoke, write
+
+KINEMATIC = """\
+[flight]
+plant = "kinematic"
+duration_s = 60.0
+law = { name = "nftsm", gains = "fitted" }
+"""
+OVER = ("--over", "start.heading_deg=0:360", "--over", "target.speed_mps=0:6")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return write(tmp_path / "moving.toml", KINEMATIC)
+
+
+def falsify(file: Path, out: Path, *words: object, workers: int = 0) -> str:
+    done = invoke("falsify", file, "--out", out, *OVER, "--workers", workers, *words)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.mark.parametrize(
+    ("kind", "dimensions", "share"), [("bowl", 2, 0.001), ("ripple", 3, 0.01), ("kink", 4, 0.01), ("dips", 6, 0.01)]
+)
+def test_planted_failures_are_found_with_half_of_what_random_search_needs(
+    kind: str, dimensions: int, share: float
+) -> None:
+    needed = [flights_needed(kind, dimensions, share, seed) for seed in range(6)]
+    assert max(needed) <= 0.5 * needed_at_random(share, 0.95)
+    assert max(needed) <= 300
+
+
+def test_the_counterexample_breaks_the_requirement_when_it_is_flown_again(file: Path, tmp_path: Path) -> None:
+    out = falsify(file, tmp_path / "out", "--requirement", "range_error_peak_m < 5", "--flights", 24)
+    assert "to be broken: range_error_peak_m < 5" in out
+    again = json.loads(command("fly", tmp_path / "out" / "counterexample.toml", "--json").stdout)
+    results = harness.load_results(tmp_path / "out").set_index("key")
+    assert again["metrics"]["range_error_peak_m"] == results["range_error_peak_m"].max() > 5.0
+    assert again["key"] in results.index
+
+
+def test_a_search_is_the_same_on_any_number_of_workers_and_when_it_is_resumed(file: Path, tmp_path: Path) -> None:
+    words = ("--requirement", "convergence_time_s < 30")
+    falsify(file, tmp_path / "a", *words, "--flights", 8)
+    assert "8 flown, 8 earlier, 0 failed" in falsify(file, tmp_path / "a", *words, "--flights", 16)
+    falsify(file, tmp_path / "b", *words, "--flights", 16, workers=2)
+    for name in ("trials.csv", "counterexample.toml"):
+        assert (tmp_path / "a" / name).read_text() == (tmp_path / "b" / name).read_text()
+
+
+def test_of_none_the_bound_is_that_of_the_uniform_trials_alone(file: Path, tmp_path: Path) -> None:
+    out = falsify(file, tmp_path / "out", "--requirement", "range_error_peak_m < 1e6", "--flights", 20)
+    assert "none in 20 trials; above is the one that came closest" in out
+    again = falsify(file, tmp_path / "out", "--requirement", "range_error_peak_m < 1e6", "--flights", 20, "--json")
+    told = json.loads(again.splitlines()[-1])
+    assert told["counterexample"] is None
+    uniform = told["uniform"]
+    assert 5 <= uniform["trials"] < 20
+    assert uniform["broken"] == 0
+    assert uniform["share"] == pytest.approx(1.0 - 0.05 ** (1.0 / uniform["trials"]))  # Clopper and Pearson, of none
+    assert "safe" not in out
+    assert not (tmp_path / "out" / "counterexample.toml").exists()
+
+
+def test_the_upper_bound_holds_the_share_in_95_of_100_cases() -> None:
+    assert upper_bound(0, 59) == pytest.approx(0.0495, abs=1e-4)
+    assert upper_bound(3, 3) == 1.0
+
+
+def test_a_real_aircraft_loses_its_target_and_the_search_finds_how(tmp_path: Path) -> None:
+    text = KINEMATIC.replace("kinematic", "sixdof").replace("60.0", "30.0")
+    file = write(tmp_path / "lost.toml", f"{text}[flight.metrics]\nmonitoring_range_m = 400.0\n")
+    out = falsify(file, tmp_path / "out", "--requirement", "outcome = completed", "--flights", 16)
+    assert "target_lost" in out
+    flight = load_flight(tmp_path / "out" / "counterexample.toml")
+    assert harness.simulate(flight).outcome == "target_lost"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--requirement", "speed < 5"], "--requirement 'speed < 5': "),
+        (["--requirement", "laps"], "--requirement 'laps': "),
+        (["--requirement", "laps > 1", "--over", "law.k2=3"], "--over law.k2=3: must be KEY=LO:HI"),
+    ],
+)
+def test_bad_input_is_one_line(words: list[str], said: str, file: Path, tmp_path: Path) -> None:
+    done = invoke("falsify", file, "--out", tmp_path / "out", *OVER, *words)
+    assert done.exit_code == 2
+    assert said in done.output
+    assert len(done.output.splitlines()) == 1
