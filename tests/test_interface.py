@@ -481,4 +481,4 @@ def test_the_docstring_of_a_log_names_every_column() -> None:
     assert harness.FlightLog.__doc__
     named = set(re.findall(r"`(\w+)`", harness.FlightLog.__doc__))
     assert set(COLUMNS) <= named
-    assert named - set(COLUMNS) == {"flight", "outcome", "reason", "table"}
+    assert named - set(COLUMNS) == {"flight", "law_NAME", "outcome", "reason", "table"}

@@ -31,7 +31,7 @@ class Trial(NamedTuple):
     decisive: int  # the condition in which it does worst
 
 
-class Bound(NamedTuple):
+class UpperBound(NamedTuple):
     """What the uniform trials say of the share of the ranges in which the requirement is broken."""
 
     trials: int
@@ -114,12 +114,12 @@ class Falsification:
         return sorted((t for t in self.trials if t.broken), key=lambda trial: trial.robustness or 0.0)
 
     @property
-    def bound(self) -> Bound:
+    def bound(self) -> UpperBound:
         """The upper bound on the share of the ranges that breaks the requirement."""
         drawn = [trial for trial in self.trials if trial.uniform]
         failed = sum(trial.robustness is None for trial in drawn)
         broken = sum(trial.broken for trial in drawn)
-        return Bound(len(drawn), broken, failed, upper_bound(broken + failed, len(drawn)))
+        return UpperBound(len(drawn), broken, failed, upper_bound(broken + failed, len(drawn)))
 
     @property
     def first_broken(self) -> int | None:
