@@ -34,7 +34,7 @@ def falsify(file: Path, out: Path, *words: object, workers: int = 0) -> str:
 @pytest.mark.parametrize(
     ("kind", "dimensions", "share"), [("bowl", 2, 0.001), ("ripple", 3, 0.01), ("kink", 4, 0.01), ("dips", 6, 0.01)]
 )
-def test_planted_failures_are_found_with_half_of_what_random_search_needs(
+def test_planted_failures_with_a_slope_are_found_with_half_of_what_random_search_needs(
     kind: str, dimensions: int, share: float
 ) -> None:
     needed = [flights_needed(kind, dimensions, share, seed) for seed in range(6)]
