@@ -198,7 +198,10 @@ def page(cells: Sequence[Cell]) -> Iterator[str]:
                 f"searches within {MOST} flights, the median with {_number(cell.median)}; uniform draws find it in "
                 f"{1.0 - (1.0 - cell.share) ** MOST:.0%}."
             )
-    yield "Where nothing near a failure is worse than anywhere else, a model has nothing to go by: uniform draws do better."
+    yield (
+        "Where nothing near a failure is worse than anywhere else, a model has nothing to go by: uniform draws do "
+        "better."
+    )
     yield "That is so for an outcome and for a truth value; a number tells more."
 
 
