@@ -334,7 +334,7 @@ def test_a_long_path_is_never_cut(file: Path, tmp_path: Path) -> None:
 
 
 COMPLETED = [
-    ("", "f", ["fly"]),
+    ("", "fl", ["fly"]),
     ("list", "se", ["settings"]),
     ("fly x.toml", "--ag", ["--against"]),
     ("fly x.toml --set", "start.h", ["start.heading_deg=", "start.heading_deg=30.0"]),
