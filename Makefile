@@ -13,7 +13,7 @@ test: install  ## everything CI checks
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --dist loadfile
 
 docs: install  ## the documents as a site, offline, warnings as errors: out/site/index.html
 	$(SITE)
