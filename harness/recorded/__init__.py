@@ -1,0 +1,1 @@
+"""Flights that somebody recorded: read from their logs, judged, and held beside the simulated aircraft."""
