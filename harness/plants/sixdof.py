@@ -7,6 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -20,6 +21,7 @@ import numpy as np
 import aircraft
 import autopilot
 from autopilot.angles import wrap
+from harness.fence import FenceError, checked
 from harness.flight_errors import Errors
 from harness.plants.plant import End, Outcome, PlantError, Start
 from harness.plants.state import State
@@ -37,10 +39,6 @@ STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 _PLANTS = Path(__file__).parent
 _INNER_LOOP = Path(autopilot.__file__).parent
 _LOOP = "inner_loop"  # as a model names it
-_SECTIONS = (  # of a model; not the others of JSBSim: output, input, child
-    "fileheader", "metrics", "mass_balance", "ground_reactions", "propulsion", "system", "autopilot", "flight_control",
-    "aerodynamics", "external_reactions", "buoyant_forces",
-)  # fmt: skip
 _PROPERTY = re.compile(r"(?<![\w/])[a-z][\w-]*(?:/[\w-]+)+")
 _AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
 
@@ -76,22 +74,12 @@ class ModelError(PlantError):
 def _parsed(model: Path) -> ElementTree.Element:
     """The root of a model, which reads no other file but the inner loop and writes none. Raises `ModelError`.
 
-    JSBSim would write any file that a model names, and open sockets; and what a model includes is in no flight's key.
+    What a model includes would be in no flight's key.
     """
     try:
-        if not model.is_file():
-            raise ModelError(f"{model}: must be a file")
-        root = ElementTree.parse(model).getroot()
-    except OSError as error:
-        raise ModelError(f"{model}: {error.strerror}") from None
-    except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two of an encoding
-        raise ModelError(f"{model}: {error}") from None
-    for section in root:
-        if section.tag not in _SECTIONS:
-            raise ModelError(f"{model}: <{section.tag}> is not read, only {', '.join(_SECTIONS)}")
-    for element in root.iter():
-        if (file := element.get("file")) is not None and (element.tag, file) != ("system", _LOOP):
-            raise ModelError(f'{model}: <{element.tag} file="{file}"> is not read, only <system file="{_LOOP}">')
+        root = checked(model, systems=(_LOOP,))
+    except FenceError as error:
+        raise ModelError(str(error)) from None
     for loop in (model.with_name(f"{_LOOP}.xml"), model.parent / "Systems" / f"{_LOOP}.xml"):
         if os.path.lexists(loop):
             raise ModelError(f"{loop}: JSBSim would read it instead of the inner loop of the harness: move it away")
@@ -122,7 +110,7 @@ def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> jsbsim.FGF
     with TemporaryDirectory(prefix="harness-") as folder:
         copy = Path(folder) / airframe.name
         copy.mkdir()
-        model = _parsed(aircraft.model(airframe))
+        model = deepcopy(_parsed(aircraft.model(airframe)))
         _alter(model, errors)
         ElementTree.ElementTree(model).write(aircraft.model(copy), encoding="utf-8")
         return _load(copy, step)
@@ -180,6 +168,24 @@ def _load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
     return fdm
 
 
+def check_body(fdm: jsbsim.FGFDMExec) -> None:
+    """Raises `ModelError` for a mass or a tensor of inertia that no body has: JSBSim would fly it all the same.
+
+    JSBSim computes the inertia in `run_ic()`.
+    """
+    mass = SLUG * fdm["inertia/mass-slugs"]
+    if not 0.0 < mass < math.inf:
+        raise ModelError(f"the mass of the model is {mass:g} kg, must be above 0")
+    inertia = {x: SLUG * FT**2 * fdm[f"inertia/{x}-slugs_ft2"] for x in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
+    ixx, iyy, izz, ixy, ixz, iyz = inertia.values()
+    minors = ixx, ixx * iyy - ixy**2, _dot((ixx, -ixy, -ixz), _cross((-ixy, iyy, -iyz), (-ixz, -iyz, izz)))
+    if not all(0.0 < minor < math.inf for minor in minors):
+        told = ", ".join(f"{name} {value:.3g}" for name, value in inertia.items())
+        raise ModelError(
+            f"no body has the moments of inertia of the model, {told} kg m²: they must be positive definite"
+        )
+
+
 def _text(path: Path) -> str:
     """The path as JSBSim takes it: text, whose bytes in UTF-8 are the name. Raises `ModelError`."""
     try:
@@ -220,7 +226,8 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
     """Puts the aircraft at `start`, level and unaccelerated in the wind there, and returns its trim.
 
     Newton's method on the accelerations that JSBSim computes. It places the surfaces directly: the actuators do not run
-    before the inner loop is engaged, so their lag cannot falsify the result. Raises `NoTrimError` without a solution.
+    before the inner loop is engaged, so their lag cannot falsify the result. Raises `NoTrimError` without a solution,
+    `ModelError` for what is no body.
     """
     _place(fdm, start, air.horizontal(0))
     x = Trim(pitch=0.05, elevator=0.0, throttle=0.5)
@@ -233,6 +240,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
         share = min(1.0, 0.1 / max(1e-9, *map(abs, change)))  # at most 0.1 rad, 0.1 of the throttle at a time
         x = Trim._make(v - share * d for v, d in zip(x, change, strict=True))
     is_steady = max(map(abs, _accelerations(fdm, x))) < 1e-8
+    check_body(fdm)
     if not (is_steady and 0.0 < x.throttle < 1.0 and abs(x.pitch) < math.pi / 6):
         raise NoTrimError(f"no level trim at {start.airspeed:g} m/s, {start.altitude:g} m high")
     return x
@@ -451,7 +459,12 @@ class _SixDofFlying:
             blow()
         run()
         self.state = state = self._read(before)
-        if not (state.altitude > GROUND and abs(state.bank) < DEPARTURE_BANK and state.angle_of_attack < self._stall):
+        if not (
+            state.altitude > GROUND
+            and abs(state.bank) < DEPARTURE_BANK
+            and state.angle_of_attack < self._stall
+            and math.isfinite(sum(state))
+        ):
             self._judge(state, period)
         else:
             self._stalled_for = 0.0
