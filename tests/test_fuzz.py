@@ -18,7 +18,7 @@ import harness
 from harness.cli.main import COMMANDS
 from harness.runs.store import JOURNAL
 from harness.settings import document, load_flight
-from tests import mutations
+from tests import mutations, recorded_logs
 from tests.builders import EXPERIMENTS, copied_airframe, invoke, write
 from tests.confined import Confined, Ended
 
@@ -95,9 +95,19 @@ def _laws(folder: Path) -> None:
     assert invoke("init", "--law", folder / "mine.py").exit_code == 0
 
 
+def _logs(folder: Path) -> None:
+    recorded_logs.write_ulog(folder / "a.ulg", recorded_logs.TOPICS)
+    recorded_logs.write_dataflash(folder / "a.bin", recorded_logs.MESSAGES)
+    recorded_logs.write_csv(folder / "a.csv", recorded_logs.COLUMNS)
+
+
+def _maps(folder: Path) -> None:
+    write(folder / "map.toml", recorded_logs.MAP)
+
+
 THINGS: Mapping[str, Callable[[Path], None]] = {
     "FILE": _settings, "MATRIX": _matrices, "TRACK": _tracks, "RUN": _runs, "RRD": _recordings, "AIRFRAME": _airframes,
-    "LAW": _laws,
+    "LAW": _laws, "LOG": _logs, "MAP": _maps,
 }  # fmt: skip
 
 # Calls, in which words in capitals stand for something
@@ -126,6 +136,9 @@ CALLS: Mapping[str, Sequence[str]] = {
     "export": [
         "RRD --to csv --out OUT/a", "RRD --to parquet --out OUT/a --flight WORD", "RUN:KEY --to csv --out OUT/a",
         "RUN --to csv --out OUT/a", "RUN --to parquet --out OUT/a",
+    ],
+    "assess": [
+        "LOG", "LOG --map MAP", "LOG --from WORD", "LOG --json --from 1 --to 2", "LOG --map WORD", "WORD --map MAP",
     ],
     "init": ["OUT/a.toml", "FILE", "OUT/WORD", "--law OUT/a.py", "--law LAW"],
     "run": [

@@ -49,6 +49,9 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "tune": Entry("tune:tune", "Search for the settings that do best."),
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },
+        "Real flights": {
+            "assess": Entry("assess:assess", "Read the log of a real flight, and say what it holds."),
+        },
         "The paper": {
             "demo": Entry("demo:demo", "Fly the paper's first case, two laws on three aircraft, and compare."),
             "reproduce": Entry("reproduce:reproduce", "Fly the paper's simulations and check its claims."),

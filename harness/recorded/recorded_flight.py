@@ -195,6 +195,9 @@ class RecordedFlight:
     events: tuple[LoggedEvent, ...] = ()  # modes and the like
     failure: LoggedEvent | None = None  # from then on the aircraft is not the one that is asked for
     parameters: Mapping[str, float] = field(default_factory=dict)  # settings of the autopilot, where the log has them
+    of_receipt: bool = False  # the times are when a message was received: they hold the age of the telemetry
+    refusals: tuple[str, ...] = ()  # why nothing may be judged from this log, a line each
+    vehicle: str = ""  # what the log says of the autopilot
 
     def __getitem__(self, name: str) -> Channel:
         """The channel. Raises KeyError, for a name that is none of `QUANTITIES` too."""
@@ -223,7 +226,8 @@ class RecordedFlight:
         """The same flight from `begin` to `end`, s; channels without a sample there are left out."""
         cut = {name: channel.between(begin, end) for name, channel in self.channels.items()}
         events = tuple(event for event in self.events if begin <= event.time <= end)
-        return replace(self, channels={name: channel for name, channel in cut.items() if len(channel)}, events=events)
+        left = {name: channel for name, channel in cut.items() if len(channel) and begin <= self.end}
+        return replace(self, channels=left, events=events)
 
     def table(self, names: Iterable[str], time: Array) -> Array:
         """The channels at these times, (times, names); NaN where one is not known."""

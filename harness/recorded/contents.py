@@ -1,0 +1,82 @@
+"""What a recorded flight holds, as lines: channels, their units, where they come from, and how often they change."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from harness.recorded.recorded_flight import QUANTITIES, Channel, RecordedFlight
+from harness.tables import number, table
+
+_SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi)}
+
+
+def contents(flight: RecordedFlight) -> Iterator[str]:
+    """The lines that tell what was read."""
+    files = flight.sources[0] if len(flight.sources) == 1 else f"{len(flight.sources)} files"
+    yield f"{flight.name}: {duration(flight):.1f} s of flight log, from {files}"
+    if flight.vehicle:
+        yield f"vehicle: {flight.vehicle}"
+    yield f"clock: {flight.clock}; times in s since the log's first row"
+    yield ""
+    headings = ["channel", "new values\n/s", "rows\n/s", "longest gap\ns", "least", "greatest", "unit", "what it is"]
+    yield from table(headings, (_row(name, flight) for name in QUANTITIES if name in flight), "lrrrrrl")
+    yield ""
+    for event in flight.events:
+        yield f"at {event.time:.1f} s: {event.text}"
+    if flight.failure:
+        yield f"at {flight.failure.time:.1f} s: failure: {flight.failure.text}"
+    for problem in flight.problems:
+        yield f"note: {problem}"
+    for refusal in flight.refusals:
+        yield f"cannot be judged: {refusal}"
+
+
+def duration(flight: RecordedFlight) -> float:
+    """From the first to the last sample, s."""
+    return flight.end - flight.begin
+
+
+def as_json(flight: RecordedFlight) -> dict[str, Any]:
+    """The same for a program; SI, rad."""
+    return {
+        "name": flight.name,
+        "sources": list(flight.sources),
+        "vehicle": flight.vehicle,
+        "clock": flight.clock,
+        "begin_s": flight.begin,
+        "end_s": flight.end,
+        "channels": {name: _described(name, channel) for name, channel in flight.channels.items()},
+        "events": [event._asdict() for event in flight.events],
+        "failure": flight.failure._asdict() if flight.failure else None,
+        "problems": list(flight.problems),
+        "refusals": list(flight.refusals),
+    }
+
+
+def _row(name: str, flight: RecordedFlight) -> list[str]:
+    channel = flight[name]
+    unit, scale = _SHOWN.get(QUANTITIES[name].unit, (QUANTITIES[name].unit, 1.0))
+    span = channel.time[-1] - channel.time[0]
+    what = ", ".join(filter(None, (channel.basis, channel.note)))
+    least, greatest = (number(float(value), scale) for value in (channel.values.min(), channel.values.max()))
+    return [
+        name, _finite(channel.rate), _finite(channel.rows / span if span else 0.0), _finite(channel.longest_gap), least,
+        greatest, unit, what,
+    ]  # fmt: skip
+
+
+def _finite(value: float) -> str:
+    return number(value) if math.isfinite(value) and value > 0.0 else "-"
+
+
+def _described(name: str, channel: Channel) -> dict[str, Any]:
+    return {
+        "unit": QUANTITIES[name].unit,
+        "basis": str(channel.basis),
+        "source": channel.source,
+        "note": channel.note,
+        "samples": len(channel),
+        "rows": channel.rows,
+        "new_values_per_s": channel.rate,
+        "longest_gap_s": channel.longest_gap if math.isfinite(channel.longest_gap) else None,
+    }

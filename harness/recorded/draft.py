@@ -1,0 +1,99 @@
+"""A recorded flight while it is being read: what every reader of a log does with its rows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.recorded.recorded_flight import (
+    DIRECTIONS,
+    Array,
+    Basis,
+    Channel,
+    LogError,
+    LoggedEvent,
+    RecordedFlight,
+    sampled,
+)
+
+DISORDER = 1.0  # s: rows that come so much too late are put in order; beyond it the clock was set back
+
+
+@dataclass
+class Draft:
+    """Channels and problems, in the log's own seconds, which may count from any moment."""
+
+    name: str
+    sources: Sequence[str]
+    clock: str
+    channels: dict[str, Channel] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    refusals: list[str] = field(default_factory=list)
+    events: list[LoggedEvent] = field(default_factory=list)
+    failure: LoggedEvent | None = None
+    parameters: dict[str, float] = field(default_factory=dict)
+    of_receipt: bool = False
+    vehicle: str = ""
+
+    def add(self, name: str, time: Array, values: Array, basis: Basis, source: str, note: str = "") -> None:
+        """Adds a channel, unless a better source gave it before. `time` increases: see `in_order`."""
+        if name in self.channels:
+            return
+        finite = np.isfinite(values)
+        if missing := int(np.count_nonzero(~finite)):
+            self.problems.append(f"{source}: {missing} of {len(values)} values of {name} are no numbers, and left out")
+        if name in DIRECTIONS:
+            time, values = time[finite], np.unwrap(values[finite])
+        if len(channel := sampled(time, values, basis, source, note)):
+            self.channels[name] = channel
+
+    def in_order(self, time: Array, source: str) -> NDArray[np.intp]:
+        """The rows whose times increase, in that order. What is left out, or out of order, becomes a problem."""
+        rows = np.flatnonzero(np.isfinite(time))
+        if missing := len(time) - len(rows):
+            self.problems.append(f"{source}: {missing} of {len(time)} rows have no time, and are left out")
+        t = time[rows]
+        late = np.maximum.accumulate(t) - t if len(t) else t
+        if len(t) and late.max() > DISORDER:
+            k = int(np.argmax(late > DISORDER))
+            at = f"at row {rows[k] + 1} from {t[:k].max() - t[0]:.2f} s to {t[k] - t[0]:.2f} s after its first"
+            self.refusals.append(f"{source}: the clock goes back {at}: two recordings, or a restart, in one log")
+            rows, t, late = rows[:k], t[:k], late[:k]
+        if disordered := int(np.count_nonzero(late > 0.0)):
+            how = f"come up to {late.max():.3g} s too late, and are put in order"
+            self.problems.append(f"{source}: {disordered} of {len(time)} rows {how}")
+            rows = rows[np.argsort(t, kind="stable")]
+        repeated = np.append(False, np.diff(time[rows]) == 0.0)
+        if count := int(np.count_nonzero(repeated)):
+            self.problems.append(
+                f"{source}: {count} of {len(time)} rows have the time of the row before, and are left out"
+            )
+        kept: NDArray[np.intp] = rows[~repeated]
+        return kept
+
+    def finished(self) -> RecordedFlight:
+        """The flight, its times in seconds since the log's first row. Raises `LogError` for one without any channel."""
+        if not self.channels:
+            why = "; ".join([*self.refusals, *self.problems])
+            raise LogError(f"{self.name}: has nothing that a flight is judged by{f' ({why})' if why else ''}")
+        begin = min(float(channel.time[0]) for channel in self.channels.values())
+        channels = {
+            name: Channel(c.time - begin, c.values, c.basis, c.source, c.rows, c.note)
+            for name, c in self.channels.items()
+        }
+        events = sorted(LoggedEvent(time - begin, text) for time, text in self.events)
+        failure = self.failure and self.failure._replace(time=self.failure.time - begin)
+        return RecordedFlight(
+            self.name,
+            tuple(self.sources),
+            self.clock,
+            channels,
+            tuple(self.problems),
+            tuple(events),
+            failure,
+            self.parameters,
+            self.of_receipt,
+            tuple(self.refusals),
+            self.vehicle,
+        )

@@ -1,0 +1,99 @@
+"""Whether the numbers of a recorded flight can be what they are said to be: degrees for radians, g for m/s²."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from harness.recorded.recorded_flight import Array, Basis, LogError, RecordedFlight
+
+# What an aircraft that flies reaches at most; of a few values a log may say anything.
+MOST: Mapping[str, float] = MappingProxyType(
+    {
+        "bank": np.pi, "pitch": np.pi / 2, "bank_command": np.pi, "pitch_command": np.pi / 2, "roll_rate": 15.0,
+        "pitch_rate": 15.0, "yaw_rate": 15.0, "angle_of_attack": np.pi, "sideslip": np.pi, "aileron": 1.6,
+        "elevator": 1.6, "rudder": 1.6,
+    }
+)  # fmt: skip
+_FASTEST_TURN = 6.0  # rad/s, of a direction
+_SHARE = 90.0  # percentile that is compared
+_SAID = "looks like degrees; the map gives its unit"
+_DEGREES = 180.0 / np.pi
+_BETWEEN = (0.3 * _DEGREES, 3.0 * _DEGREES)  # how much larger degrees are, with all that is not exact
+_PAIRS = (("bank", "roll_rate"), ("pitch", "pitch_rate"))
+
+
+def plausible(flight: RecordedFlight) -> RecordedFlight:
+    """The flight, with what is odd as problems. Raises `LogError` for units that cannot be: a line for each channel."""
+    wrong = [*_too_large(flight), *_against_rates(flight), *_gravity(flight)]
+    if wrong:
+        raise LogError("\n".join(dict.fromkeys(wrong)))
+    return _without_echoes(flight)
+
+
+def _too_large(flight: RecordedFlight) -> Iterator[str]:
+    for name, channel in flight.channels.items():
+        if name in MOST and len(channel) > 3:
+            size = float(np.percentile(np.abs(channel.values), _SHARE))
+            if size > 1.1 * MOST[name]:
+                yield f"{channel.source}: {name} reaches {size:.3g} rad: {_SAID}"
+        if name in ("yaw", "course") and len(channel) > 3:
+            pace = float(np.percentile(np.abs(np.diff(channel.values) / np.diff(channel.time)), _SHARE))
+            if pace > _FASTEST_TURN and np.ptp(channel.values) > 2.0 * np.pi:
+                yield f"{channel.source}: {name} turns at {pace:.3g} rad/s: {_SAID}"
+
+
+def _against_rates(flight: RecordedFlight) -> Iterator[str]:
+    """An angle that changes some 57 times as fast as its rate says, or as slowly."""
+    for angle, rate in _PAIRS:
+        if not flight.has(angle, rate) or len(flight[angle]) < 20:
+            continue
+        time, values = flight[angle].time, flight[angle].values
+        middle = 0.5 * (time[1:] + time[:-1])
+        changes, rates = np.diff(values) / np.diff(time), flight[rate].at(middle)
+        known = np.isfinite(rates) & (np.diff(time) < 1.0)
+        if np.count_nonzero(known) < 20:
+            continue
+        change, told = _spread(changes[known]), _spread(rates[known])
+        if _looks_like_degrees(change, told):
+            yield (
+                f"{flight[angle].source}: {angle} changes {change / told:.0f} times as fast as {rate} says: "
+                f"{angle} looks like degrees, or {rate} was radians already"
+            )
+        elif _looks_like_degrees(told, change):
+            yield (
+                f"{flight[rate].source}: {rate} is {told / change:.0f} times what {angle} changes by: "
+                f"{rate} looks like degrees, or {angle} was radians already"
+            )
+
+
+def _looks_like_degrees(large: float, small: float) -> bool:
+    return small > 1e-4 and _BETWEEN[0] < large / small < _BETWEEN[1] and large > 0.3
+
+
+def _spread(values: Array) -> float:
+    return float(np.percentile(np.abs(values), _SHARE))
+
+
+def _gravity(flight: RecordedFlight) -> Iterator[str]:
+    name = "vertical_acceleration"
+    if name in flight and len(flight[name]) > 3:
+        usual, source = float(np.median(flight[name].values)), flight[name].source
+        if 0.5 < abs(usual) < 2.0:
+            yield f"{source}: {name} is {usual:.2g} m/s2 as a rule: looks like g; give its unit in the map"
+        elif usual > 5.0:
+            yield f"{source}: {name} is {usual:.3g} m/s2 as a rule: points up; it must be negative in level flight"
+
+
+def _without_echoes(flight: RecordedFlight) -> RecordedFlight:
+    """Without commands that are what is flown to the last digit: an autopilot in manual logs them so."""
+    channels, problems = dict(flight.channels), list(flight.problems)
+    for name, channel in flight.channels.items():
+        flown = flight.channels.get(name.removesuffix("_command")) if name.endswith("_command") else None
+        if flown is not None and channel.basis is Basis.COMMANDED and len(channel) > 3:
+            same = np.isin(channel.values, flown.values).mean()
+            if same > 0.95 and np.ptp(channel.values) > 0.0:
+                del channels[name]
+                problems.append(f"{channel.source}: {name} repeats what is flown: no command, and left out")
+    return replace(flight, channels=channels, problems=tuple(problems))
