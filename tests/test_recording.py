@@ -19,7 +19,7 @@ from harness.flight import MetricSettings
 from harness.log import COLUMNS, FlightLog
 from harness.loop import simulate
 from harness.plants.plant import Outcome
-from harness.review.lanes import lanes_by_flight
+from harness.review.lanes import BRIEF, lanes_by_flight, without_cut_words
 from harness.review.reading import read_logs, read_recording
 from harness.review.recorder import Recorder, clean_up
 from harness.review.recording import write_recording
@@ -324,6 +324,18 @@ def test_recordings_leave_no_threads_behind(kinematic: FlightLog, tmp_path: Path
         write_recording(tmp_path / "a.rrd", {"a": kinematic}, "One")
         counts.append(sum(1 for _ in threads.iterdir()))
     assert counts[-1] <= counts[0]
+
+
+def test_a_word_that_has_no_room_in_its_lane_is_left_out_not_cut() -> None:
+    log = simulate(replace(SIXDOF, duration=70.0, law=law("nftsm", "fitted")))
+    (changes,) = (changes for name, changes in lanes_by_flight({"a": log}).items() if name == "/command")
+    shown = without_cut_words(changes, 70.0, lambda word: 4.0)
+    assert [(c.time, c.state.strip()) for c in shown] == changes
+    ends = [*(c.time for c in changes[1:]), 70.0]
+    assert [c.state.startswith(BRIEF) for c in shown] == [
+        end - c.time < 4.0 for c, end in zip(changes, ends, strict=True)
+    ]
+    assert len({c.state.startswith(BRIEF) for c in shown}) == 2
 
 
 def test_chatter_has_a_lane_that_convergence_does_not_hide() -> None:

@@ -5,7 +5,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
+from PIL import Image
 from rerun.experimental import ViewerClient
 
 from autopilot.estimator import Estimator
@@ -15,12 +18,15 @@ from harness.log import FlightLog
 from harness.loop import simulate
 from harness.review.live import Live
 from harness.review.recording import write_recording
+from harness.review.screenshots import shoot
 from harness.review.viewer import ViewerError, free_port, headless, listening, quiet
+from harness.settings import flight_from_document
 from harness.world.target import Target
 from harness.world.wind import Gust, Wind
 from tests.builders import command, drawing
 
 TABS = 6
+FAST_LAW = {"name": "nftsm", "gains": "fitted", "max_heading_rate_deg_s": 10.0, "standoff_m": "15.4 s"}
 
 
 def flight(plant: str, gains: str = "paper_1", kind: Literal["truth", "ekf"] = "ekf", duration: float = 20.0) -> Flight:
@@ -80,6 +86,24 @@ def test_every_tab_is_drawn_at_several_times_without_a_report(
                 client.save_screenshot(str(tmp_path / "shot.png"))  # draws, and so reports
                 assert amiss(client) == []
         assert (tmp_path / "shot.png").stat().st_size > 20_000  # bytes: more than an empty window has
+
+
+@drawing
+def test_the_time_axes_of_stacked_plots_line_up_at_25_m_s(tmp_path: Path) -> None:
+    """The cursor, a white line, is at one place in all of them; their labels differ in width."""
+    fast = {"plant": "sixdof", "aircraft": "aerosonde", "duration_s": 70.0, "law": FAST_LAW}
+    path, shot = tmp_path / "a.rrd", tmp_path / "shot.png"
+    write_recording(path, {"sixdof": simulate(flight_from_document(fast))}, "Fast")
+    with headless(path) as client:
+        for tab, most in (("overview", 4), ("cursor", 10)):  # points; around the cursor some axes follow the values
+            shoot(client, tab, 60.0, shot)
+            with Image.open(shot) as picture:
+                pixels = np.asarray(picture.convert("RGB"), float)[60:960, 660:]
+            white = (pixels.min(axis=2) > 100) & (np.ptp(pixels, axis=2) < 6)
+            upright = sliding_window_view(white, 30, axis=0).min(axis=2)
+            places = np.flatnonzero(upright.max(axis=0))
+            assert np.count_nonzero(upright) > 250  # there is a cursor in several plots
+            assert np.ptp(places) <= most, tab
 
 
 @drawing

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from harness.plants.plant import Outcome
 from harness.review.styled import Colour
 
 WINDOW = 1.0  # s: a lane has one state per window, so that a chattering command stays readable
+BRIEF = "\n\n"  # before a state: its word stands below the lane, where the viewer cuts it off, and in its tooltip
 MOST_EVENTS = 15  # of one lane; a lane with more changes becomes one event
 GUSTS = (0.25, 0.1)  # thresholds, relative to the nominal airspeed
 
@@ -83,6 +84,15 @@ def lanes_by_flight(logs: Mapping[str, FlightLog]) -> dict[str, list[Change]]:
         for lane, changes in zip(LANES_OF_SEVERAL, (summary(log), chatter_lane(log)), strict=True):
             found[lane_entity(lane, f"{name}-{number}" if taken else name)] = changes
     return {entity: changes for entity, changes in found.items() if changes}
+
+
+def without_cut_words(changes: Sequence[Change], until: float, length: Callable[[str], float]) -> list[Change]:
+    """The changes with `BRIEF` before each state that does not last as long as its word is: `length`, s."""
+    ends = [*(change.time for change in changes[1:]), until]
+    return [
+        Change(time, state if end - time >= length(state) else f"{BRIEF}{state}")
+        for (time, state), end in zip(changes, ends, strict=True)
+    ]
 
 
 def lanes(log: FlightLog) -> dict[str, list[Change]]:

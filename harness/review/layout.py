@@ -9,14 +9,16 @@ import rerun.blueprint as rrb
 
 from harness.review.charts import Chart, chart_view
 from harness.review.lanes import LANES_OF_SEVERAL
-from harness.review.plots import DECADES, Plot
+from harness.review.plots import DECADES, Plot, span
 from harness.review.recorder import Recorder
 from harness.review.scene import chase_view, scene_view
 from harness.review.styled import WORDS, Colour, StyledFlight, is_crowd
 
-_WIDTH, _HEIGHT = 1600.0, 870.0  # points: all tabs in a window 1600 wide and 1000 high
+_WIDTH, _HEIGHT = 1600.0, 905.0  # points: all tabs in a window 1600 wide and 1000 high
 _RIGHT = 950.0  # points: width of the column of plots in the overview
 _LANE, _LANES = 40.5, 62.0  # points: height of a lane, and of the frame around all lanes
+_LANE_OF_MANY = 320.0  # points: width of the lanes of many flights
+_LANE_LETTER, _BESIDE_WORD = 6.2, 12.0  # points: width of a letter in a lane, and of the room beside its word
 _MOST_LANES_WITH_SIDESLIP = 4  # more leave no room for that plot in the overview
 _EVENTS = 190.0  # points: height of the events
 _METRIC, _METRICS = 26.0, 75.0  # points: height of a row of the metrics, and of the rest of them
@@ -26,10 +28,28 @@ _ENTRY, _AROUND_LEGEND = 23.5, 70.0  # points: height of a line of a legend, and
 _DIGIT, _MINUS, _POINT, _BESIDE_DIGITS = 7.3, 7.0, 2.2, 8.5  # points: widths beside a plot
 _AXIS = 35.0  # points: the usual width of the numbers beside a plot
 _LABEL = 30.0  # points: half of a label below a plot
+_AROUND_PLOT = 43.0  # points: height of the title above a plot and of the labels below it
+_APART, _CLEAR = 20.0, 9.0  # points: between numbers beside a plot, and from a number to the end of its axis
+_MOST_WIDENED = 1.7  # times: the most by which the axis of a plot grows, so that a second number stands beside it
+_ENOUGH = 2  # numbers beside a plot: with fewer, its title says its range
+_NEAR = ("range_error", "sliding_variable")  # around the cursor their axes follow the values in view
+_CURSOR = 30.0  # s to either side of the cursor
 _STEPS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s between the labels below plots
 _IN_FRONT_OF: Colour = (72, 72, 72)  # the other flights, where one is in front
 PlayState = Literal["following", "paused"]
 Tab = rrb.Container | rrb.View
+
+
+class _Size(NamedTuple):
+    """Of a view, points."""
+
+    width: float
+    height: float
+
+    @property
+    def plot(self) -> float:
+        """The height of the plot in it."""
+        return max(self.height - _AROUND_PLOT, 1.0)
 
 
 class Content(NamedTuple):
@@ -76,6 +96,12 @@ def layout(content: Content) -> rrb.Blueprint:
     )
 
 
+def word_length(content: Content, word: str) -> float:
+    """The time that a lane of the overview must show a state for to have room for its word, s."""
+    width = _LANE_OF_MANY - 2.0 * _LABEL if content.crowd else _RIGHT * (1.0 - _gutter(content.overview, _RIGHT))
+    return (_BESIDE_WORD + _LANE_LETTER * len(word)) * content.until / width
+
+
 def _overview(content: Content) -> Tab:
     """Scene, metrics and events on the left; on the right the whole flight, or a cell for each of many flights."""
     flights = content.flights
@@ -106,26 +132,32 @@ def _whole(content: Content) -> Tab:
         plots[0] = plots[0]._replace(title=first)
     legends = [plot for plot in plots if len(flights) == 1 or plot.name in ("range_error", DECADES)]
     gutter = _gutter(legends, _RIGHT)
-    widest = _widest(plots)
-    views = [_strip(plot, content, gutter, _RIGHT, widest, legend=plot in legends) for plot in plots]
     lanes_height = _LANES + _LANE * len(content.lanes)
     needed = [_AROUND_LEGEND + _ENTRY * _entries(plot) if plot in legends else 0.0 for plot in plots]
     needed = [_DECADES if plot.name == DECADES else height for plot, height in zip(plots, needed, strict=True)]
-    shares = [*_heights(needed, _HEIGHT - lanes_height), lanes_height]
-    return rrb.Vertical(*views, _lanes(content.lanes, content, "modes", gutter, _RIGHT, widest), row_shares=shares)
+    heights = _heights(needed, _HEIGHT - lanes_height)
+    sizes = [_Size(_RIGHT, height) for height in heights]
+    widest = max(map(_beside, plots, sizes), default=0.0)
+    views = [
+        _strip(plot, content, gutter, size, widest, legend=plot in legends)
+        for plot, size in zip(plots, sizes, strict=True)
+    ]
+    lanes = _lanes(content.lanes, content, "modes", gutter, _RIGHT, widest)
+    return rrb.Vertical(*views, lanes, row_shares=[*heights, lanes_height])
 
 
 def _cells(content: Content) -> Tab:
     """A cell for each flight: its error in front of the others', in grey, and its heading rate alone."""
     columns = 2 if len(content.flights) <= 4 else 3
-    width = _RIGHT / columns
+    width, height = _RIGHT / columns, _HEIGHT / math.ceil(len(content.flights) / columns)
     error, rate = content.plots(DECADES)[0], content.plots("heading_rate")[0]
-    widest = _widest([error, rate])
+    tall, low = _Size(width, 0.6 * height), _Size(width, 0.4 * height)
+    widest = max(_beside(error, tall), _beside(rate, low))
     cells = []
     for flight in content.flights:
         views = [
-            _strip(error, content, 0.0, width, widest, legend=False, front=flight, title=flight.name),
-            _strip(rate, content, 0.0, width, widest, legend=False, alone=flight, title="its heading rate [deg/s]"),
+            _strip(error, content, 0.0, tall, widest, legend=False, front=flight, title=flight.name),
+            _strip(rate, content, 0.0, low, widest, legend=False, alone=flight, title="its heading rate [deg/s]"),
         ]
         cells.append(rrb.Vertical(*views, row_shares=(3.0, 2.0)))
     return rrb.Grid(*cells, grid_columns=columns)
@@ -139,25 +171,19 @@ def _circle(content: Content) -> Tab:
 def _around_the_cursor(content: Content) -> Tab:
     flights = content.flights
     left = rrb.Vertical(chase_view(flights[-1], flights), scene_view(flights, 1.8), row_shares=(3.0, 2.0))
-    axis = rrb.TimeAxis(link="LinkToGlobal")  # Rerun shows 30 s to either side, whatever range is set
     if content.crowd:
-        (rate,) = content.plots("heading_rate")
-        right = [
-            _view(rate, axis, title=f"{flight.name}: heading rate [deg/s]", legend=False, alone=flight)
-            for flight in flights
-        ]
+        plots = content.plots("heading_rate") * len(flights)
     else:
-        right = [
-            _view(
-                plot,
-                axis,
-                title=_coloured(plot, flights),
-                legend=False,
-                near=plot.name in ("range_error", "sliding_variable"),
-            )
-            for plot in content.overview
-            if plot.name != DECADES
-        ]
+        plots = [plot for plot in content.overview if plot.name != DECADES]
+    size = _Size(0.6 * _WIDTH, _HEIGHT / max(1, len(plots)))
+    besides = [_beside(_settled(plot) if plot.name in _NEAR else plot, size) for plot in plots]
+    widest = max(besides, default=0.0)
+    right = []
+    of_flight = flights if content.crowd else [None] * len(plots)
+    for plot, beside, flight in zip(plots, besides, of_flight, strict=True):
+        title = f"{flight.name}: heading rate [deg/s]" if flight else _coloured(plot, flights)
+        axis = _around(widest - beside, size.width - widest)
+        right.append(_view(plot, size, axis, title=title, legend=False, near=plot.name in _NEAR, alone=flight))
     return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=(2.0, 3.0), name="Around the cursor, ±30 s")
 
 
@@ -166,9 +192,9 @@ def _aircraft(content: Content) -> Tab:
     if not content.crowd:
         return _stack_of(content.aircraft, content, "Aircraft")
     plots = content.plots("bank", "sideslip", "airspeed", "altitude")
-    width = _WIDTH / len(plots)
+    size = _Size(_WIDTH / len(plots), _HEIGHT / len(content.flights))
     views = [
-        _strip(plot, content, 0.0, width, legend=False, alone=flight, title=f"{flight.name}: {plot.title}")
+        _strip(plot, content, 0.0, size, legend=False, alone=flight, title=f"{flight.name}: {_of(plot, flight)}")
         for flight in content.flights
         for plot in plots
     ]
@@ -181,7 +207,7 @@ def _target(content: Content) -> Tab:
         left: Tab = scene_view(content.flights, 0.6, "Target and circle")
         plots = [seen, *plots]
     else:
-        below = _strip(seen, content, _gutter([seen], 530.0), 530.0)
+        below = _strip(seen, content, _gutter([seen], 530.0), _Size(530.0, _HEIGHT / 3.0))
         left = rrb.Vertical(scene_view(content.flights, 0.95, "Target and circle"), below, row_shares=(2.0, 1.0))
     right = _grid(plots, content, 2, 1060.0)
     return rrb.Horizontal(left, right, column_shares=(1.0, 2.0), name="Target")
@@ -205,7 +231,12 @@ def _event_view() -> rrb.View:
 
 
 def _lanes(
-    entities: Sequence[str], content: Content, name: str, gutter: float = 0.0, width: float = 320.0, widest: float = 0.0
+    entities: Sequence[str],
+    content: Content,
+    name: str,
+    gutter: float = 0.0,
+    width: float = _LANE_OF_MANY,
+    widest: float = 0.0,
 ) -> rrb.View:
     return rrb.StateTimelineView(
         origin="/",
@@ -226,8 +257,9 @@ def _grid(
 ) -> rrb.Container:
     """A grid of plots whose time axes line up, with legends unless these only repeat colours."""
     gutter = _gutter(plots, width / columns) if legend else 0.0
-    widest = _widest(plots)
-    views = [_strip(plot, content, gutter, width / columns, widest, legend=legend) for plot in plots]
+    size = _Size(width / columns, _HEIGHT / max(1, math.ceil(len(plots) / columns)))
+    widest = max((_beside(plot, size) for plot in plots), default=0.0)
+    views = [_strip(plot, content, gutter, size, widest, legend=legend) for plot in plots]
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
@@ -235,7 +267,7 @@ def _strip(
     plot: Plot,
     content: Content,
     gutter: float,
-    width: float,
+    size: _Size,
     widest: float = 0.0,
     *,
     legend: bool = True,
@@ -245,13 +277,14 @@ def _strip(
 ) -> rrb.View:
     """A plot over the whole flight; see `_view`. `widest` are the numbers beside the plots above and below."""
     near = content.growing and plot.name != "heading_rate"  # its range is known: the limit
-    beside = widest if near else _beside(plot)
-    axis = _whole_flight(content, gutter, width, beside, max(widest, beside))
-    return _view(plot, axis, legend=legend, title=title or plot.title, near=near, alone=alone, front=front)
+    beside = widest if near else _beside(plot, size)
+    axis = _whole_flight(content, gutter, size.width, beside, max(widest, beside))
+    return _view(plot, size, axis, legend=legend, title=title or plot.title, near=near, alone=alone, front=front)
 
 
 def _view(
     plot: Plot,
+    size: _Size,
     axis: rrb.TimeAxis,
     *,
     title: str,
@@ -271,13 +304,17 @@ def _view(
         for entity, series in entities.items()
         if front is not None and series.flight not in ("", front.name)
     }
+    low, high = _scale(plot, size)
+    if not near and contents and len(_numbers(low, high, size)) < _ENOUGH:
+        decimals = max(0, -math.floor(math.log10(0.2 * (high - low))))
+        title = f"{title}, {low:.{decimals}f} to {high:.{decimals}f}"
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
         overrides=grey,
         name=title,
         axis_x=axis,
-        axis_y=None if near else rrb.ScalarAxis(range=plot.span),
+        axis_y=None if near else rrb.ScalarAxis(range=(low, high)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
     )
 
@@ -296,20 +333,66 @@ def _whole_flight(content: Content, gutter: float, width: float, beside: float, 
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(*both_ends))
 
 
-def _widest(plots: Sequence[Plot]) -> float:
-    return max(map(_beside, plots), default=0.0)
+def _around(missing: float, width: float) -> rrb.TimeAxis:
+    """The time axis around the cursor: it begins so much earlier as numbers beside the plot are `missing`, points."""
+    begin = -_CURSOR - 2.0 * _CURSOR * missing / width
+    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=s) for s in (begin, _CURSOR))
+    return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(*ends))
 
 
-def _beside(plot: Plot) -> float:
-    """The width of the numbers beside a plot, points. Rerun labels multiples of a power of ten: see `plots.span`."""
+def _settled(plot: Plot) -> Plot:
+    """The plot with the range of its second half."""
+    return plot._replace(span=span([s._replace(values=s.values[len(s.values) // 2 :]) for s in plot.series]))
+
+
+def _scale(plot: Plot, size: _Size) -> tuple[float, float]:
+    """The range of a plot in a view of this size: with two numbers beside it, if it grows little, and none of them cut.
+
+    Rerun labels multiples of powers of ten.
+    """
     low, high = plot.span
-    step = 10.0 ** math.floor(math.log10(high - low))
-    if high - low > 7.0 * step:
-        step *= 10.0
-    decimals = max(0, -round(math.log10(step)))
-    texts = [f"{n * step:.{decimals}f}" for n in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    step = _step(low, high, size)
+    below, above = step * math.floor(low / step), step * math.ceil(high / step)
+    wider = sorted(((low, above), (below, high), (below, above)), key=lambda ends: ends[1] - ends[0])
+    for ends in ((low, high), *wider):
+        begin, end = _clear_of_numbers(*ends, size)
+        if len(_numbers(begin, end, size)) >= _ENOUGH and end - begin <= _MOST_WIDENED * (high - low):
+            return begin, end
+    return _clear_of_numbers(low, high, size)
+
+
+def _clear_of_numbers(low: float, high: float, size: _Size) -> tuple[float, float]:
+    """The range, grown where a number would stand so close to its end that it is cut."""
+    numbers = _numbers(low, high, size)
+    if not numbers:
+        return low, high
+    clear = _CLEAR * (high - low) / size.plot
+    return min(low, numbers[0] - clear), max(high, numbers[-1] + clear)
+
+
+def _numbers(low: float, high: float, size: _Size) -> list[float]:
+    """The numbers that Rerun writes beside a plot."""
+    step = _step(low, high, size)
+    return [n * step for n in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
+def _step(low: float, high: float, size: _Size) -> float:
+    """The smallest power of ten whose multiples are far enough from each other to be written beside a plot."""
+    return float(10.0 ** (math.floor(math.log10(_APART * (high - low) / size.plot)) + 1))
+
+
+def _beside(plot: Plot, size: _Size) -> float:
+    """The width of the numbers beside a plot, points."""
+    low, high = _scale(plot, size)
+    decimals = max(0, -round(math.log10(_step(low, high, size))))
+    texts = [f"{number:.{decimals}f}" for number in _numbers(low, high, size)]
     widths = [_DIGIT * sum(map(str.isdigit, text)) + _MINUS * ("-" in text) + _POINT * ("." in text) for text in texts]
     return _BESIDE_DIGITS + max(widths, default=_DIGIT)
+
+
+def _of(plot: Plot, flight: StyledFlight) -> str:
+    """The title of the plot of one flight, which may have no such value."""
+    return plot.title if any(series.flight == flight.name for series in plot.series) else f"no {plot.name}"
 
 
 def _heights(needed: Sequence[float], room: float) -> list[float]:

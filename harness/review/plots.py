@@ -152,27 +152,12 @@ def level(label: str, values: Sequence[float], until: float, colour: Colour = GR
 
 
 def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
-    """The range of all values with a margin: at least `least` wide, and with two labelled numbers on the axis.
-
-    Rerun labels powers of ten, and their multiples where there is room, which is for about seven in these plots.
-    """
+    """The range of all values with a margin, at least `least` wide."""
     low, high = _extent(series)
     if not high - low >= least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
     margin = 0.08 * (high - low)
-    low, high = low - margin, high + margin
-    step = 10.0 ** math.floor(math.log10(high - low))
-    if high - low > 7.0 * step:
-        step *= 10.0
-    first, last = math.ceil(low / step), math.floor(high / step)
-    most = 0.7 * (high - low)  # the most by which the range grows to contain another number
-    if first > last and step <= most + (high - low):  # no number: both neighbours
-        return last * step - margin, first * step + margin
-    if first == last:  # one: the neighbour that is nearer
-        below, above = low - (first - 1) * step, (last + 1) * step - high
-        if min(below, above) <= most:
-            return (low, high + above + margin) if above < below else (low - below - margin, high)
-    return low, high
+    return low - margin, high + margin
 
 
 def finite(series: Series) -> Series | None:

@@ -1,6 +1,7 @@
 """Writes flights into a recording: everything is logged to a Rerun stream, then written to a file."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ from harness.files import as_text, replacing
 from harness.log import FlightLog
 from harness.review.charts import charts, log_chart
 from harness.review.differences import difference_plots
-from harness.review.lanes import COLOURS, Change, events, lanes, lanes_by_flight
-from harness.review.layout import Content, layout
+from harness.review.lanes import BRIEF, COLOURS, Change, events, lanes, lanes_by_flight, without_cut_words
+from harness.review.layout import Content, layout, word_length
 from harness.review.notes import flight_json, metric_notes, result_notes, settings_notes
 from harness.review.plots import Plot, Series, aircraft_plots, end, overview_plots
 from harness.review.recorder import Recorder, clean_up
@@ -90,7 +91,8 @@ def log_rows(to: Recorder, name: str, rows: FlightLog) -> None:
 
 def log_lane(to: Recorder, entity: str, changes: Sequence[Change]) -> None:
     """Logs a lane of states, each in its colour."""
-    to.once(entity, rr.StateConfiguration(values=list(COLOURS), labels=list(COLOURS), colors=list(COLOURS.values())))
+    states = [*COLOURS, *(f"{BRIEF}{state}" for state in COLOURS)]
+    to.once(entity, rr.StateConfiguration(values=states, labels=states, colors=2 * [*COLOURS.values()]))
     times = np.array([change.time for change in changes])
     to.columns(entity, times, rr.StateChange.columns(state=[change.state for change in changes]))
 
@@ -98,8 +100,10 @@ def log_lane(to: Recorder, entity: str, changes: Sequence[Change]) -> None:
 def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: str, command: str) -> None:
     """Logs what is known once the flights are over: lanes, events, tracks, charts, results and settings."""
     several = len(flights) > 1
-    for lane, changes in lanes_by_flight({flight.name: flight.log for flight in flights}).items():
-        log_lane(to, lane, changes)
+    by_lane = lanes_by_flight({flight.name: flight.log for flight in flights})
+    content = content_of(flights, list(by_lane))
+    for lane, changes in by_lane.items():
+        log_lane(to, lane, without_cut_words(changes, content.until, partial(word_length, content)))
     for chart in charts(flights):
         log_chart(to, chart)
     for i, flight in enumerate(flights):
@@ -113,7 +117,7 @@ def log_story(to: Recorder, flights: Sequence[StyledFlight], title: str, notes: 
             level=[event.level for event in happened],
             color=[flight.colour] * len(happened),
         )
-        to.columns(rr.new_entity_path(["events", flight.name]), np.array([event.time for event in happened]), texts)
+        to.columns(rr.new_entity_path(["events", flight.name]), np.round([event.time for event in happened], 1), texts)
     markdown = rr.MediaType.MARKDOWN
     to.once("/notes/metrics", rr.TextDocument(metric_notes(flights), media_type=markdown))
     to.once("/notes/result", rr.TextDocument(result_notes(flights, title, notes, command), media_type=markdown))
