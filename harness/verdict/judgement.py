@@ -162,17 +162,24 @@ def _judgement(
     )
 
 
+def words(family: Sequence[Evidence], significance: float) -> list[Verdict]:
+    """The words of a family of tests, with Holm's adjustment over those that can err."""
+    adjusted = iter(holm([each.strongest for each in family if each.can_err]))
+    return [
+        Verdict.UNDECIDED
+        if (next(adjusted) if each.can_err else each.strongest) > significance
+        else (Verdict.HOLDS if each.holds <= each.fails else Verdict.FAILS)
+        for each in family
+    ]
+
+
 def _decided(tested: Sequence[_Tested], margins: Mapping[str, float]) -> Iterator[Judgement]:
     """The words, with Holm's adjustment over the family."""
     significance = margins["significance"]
-    chance = [0.0 < each.evidence.strongest < 1.0 for each in tested]  # it can err
-    family = sum(chance)
-    adjusted = iter(holm([each.evidence.strongest for each, errs in zip(tested, chance, strict=True) if errs]))
-    for each, errs in zip(tested, chance, strict=True):
-        p = next(adjusted) if errs else each.evidence.strongest
-        holds = each.evidence.holds <= each.evidence.fails
-        if p <= significance and not (holds and each.barred):
-            yield replace(each.judgement, word=Verdict.HOLDS if holds else Verdict.FAILS)
+    family = sum(each.evidence.can_err for each in tested)
+    for each, word in zip(tested, words([each.evidence for each in tested], significance), strict=True):
+        if word is not Verdict.UNDECIDED and not (word is Verdict.HOLDS and each.barred):
+            yield replace(each.judgement, word=word)
             continue
         why, needed = each.barred or each.sample.why_not, None
         if not each.barred:

@@ -151,6 +151,11 @@ class Evidence(NamedTuple):
     def strongest(self) -> float:
         return min(self.holds, self.fails)
 
+    @property
+    def can_err(self) -> bool:
+        """Whether chance is in it: a number that nothing was drawn for is within its bounds, or outside."""
+        return 0.0 < self.strongest < 1.0
+
 
 def evidence(of: Sample, low: Array | float | None, high: Array | float | None) -> Evidence:
     """Whether the mean lies within the bounds, numbers or one for each seed; None for a bound that is not there."""

@@ -1,0 +1,155 @@
+"""What a recorded flight says of the assumption, and what is refused: logs of the harness's own flights, and none."""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from benchmarks.blind_logs import SCALE, TURN, WIND, BlindLog, blind_log, compared
+from harness.recorded.assessment import CANNOT, LAG, LATERAL, Assessment, assess
+from harness.recorded.recorded_flight import Basis, LoggedEvent, RecordedFlight, sampled
+from harness.verdict.parts import PARTS
+from harness.vocabulary import Verdict
+
+LEVEL, AIRSPEED, SIDESLIP = (
+    PARTS[column].title for column in ("altitude_deviation_peak_m", "airspeed_deviation", "sideslip_rms_deg")
+)
+RELATION = PARTS["turn_ratio"].title
+
+
+@lru_cache(maxsize=8)
+def log(seed: int) -> BlindLog:
+    return blind_log(seed)
+
+
+def without(flight: RecordedFlight, *names: str) -> RecordedFlight:
+    return replace(flight, channels={n: c for n, c in flight.channels.items() if n not in names})
+
+
+def words(found: Assessment) -> set[str]:
+    return {finding.word for finding in found.findings}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_what_is_hidden_in_a_log_is_recovered(seed: int) -> None:
+    hidden = log(seed).hidden
+    answer = compared(seed, hidden, assess(log(seed).recorded()))
+    assert answer.signs_right
+    assert [name for name, told in answer.told.items() if told.covered is False or told.wrong] == []
+    assert {TURN, WIND, SCALE} <= {name for name, told in answer.told.items() if told.covered}
+
+
+def test_another_way_round_of_bank_and_wind_is_found_and_said() -> None:
+    flight = log(1).recorded()
+    turned = flight.changed(np.negative, "bank", "bank_command", "wind_north", "wind_east")
+    before, after = assess(flight), assess(turned)
+    assert before[RELATION].value == pytest.approx(after[RELATION].value, rel=1e-9)
+    said = [any(note.startswith("bank: the sign") for note in found.notes) for found in (before, after)]
+    assert said[0] is not said[1]
+    assert before.estimated
+    assert after.estimated
+    assert before.estimated.is_reversed is not after.estimated.is_reversed
+
+
+def test_an_airspeed_scale_moves_the_scale_and_no_turn_relation() -> None:
+    flight = log(2).recorded()
+    scaled = flight.changed(lambda airspeed: airspeed / 1.07, "airspeed")
+    before, after = assess(flight), assess(scaled)
+    assert before[RELATION].value == pytest.approx(after[RELATION].value, rel=1e-6)
+    assert before.wind
+    assert after.wind
+    assert before.wind.scale
+    assert after.wind.scale
+    assert after.wind.scale[0] == pytest.approx(1.07 * before.wind.scale[0], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gone", "part", "reason"),
+    [
+        (("airspeed", "wind_north", "wind_east"), RELATION, "no airspeed and no wind"),
+        (("airspeed",), AIRSPEED, "no measured airspeed"),
+        (("bank",), RELATION, "the log has no bank"),
+        (("velocity_north",), RELATION, "no velocity over the ground"),
+        (("bank_command",), LAG.title, "no bank command"),
+        (("lateral_acceleration",), LATERAL.title, "no lateral specific force"),
+        (("altitude",), LEVEL, "no altitude"),
+        ((), SIDESLIP, "no vane"),
+    ],
+)
+def test_what_the_log_lacks_is_refused_without_a_number(gone: tuple[str, ...], part: str, reason: str) -> None:
+    finding = assess(without(log(1).recorded(), *gone))[part]
+    assert finding.word == CANNOT
+    assert reason in finding.reason
+    assert math.isnan(finding.value)
+
+
+def test_a_sideslip_of_an_estimated_wind_is_circular_and_one_of_a_vane_is_judged() -> None:
+    flight = log(1).recorded()
+    time = flight["bank"].time
+    angle = np.radians(1.0 + 0.2 * np.sin(7.0 * time))
+    for basis, judged in ((Basis.ESTIMATED, False), (Basis.DERIVED, False), (Basis.MEASURED, True)):
+        finding = assess(flight.with_channel("sideslip", sampled(time, angle, basis, "")))[SIDESLIP]
+        assert (finding.word != CANNOT) is judged
+        assert judged or "circular" in finding.reason
+
+
+def test_too_few_turns_are_refused_with_the_number_that_is_needed() -> None:
+    flight = log(1).recorded()
+    finding = assess(flight, flight.begin, flight.begin + 30.0)[RELATION]
+    assert finding.word == CANNOT
+    assert "5 are needed" in finding.reason
+
+
+def test_after_a_failure_nothing_is_judged_and_before_it_all_that_is_before() -> None:
+    flight = replace(log(1).recorded(), failure=LoggedEvent(60.0, "engine"))
+    after = assess(flight, 70.0)
+    assert words(after) == {CANNOT}
+    assert all("after a failure at 60.0 s (engine)" in finding.reason for finding in after.findings)
+    assert assess(flight).end == 60.0
+
+
+def test_an_aircraft_on_the_ground_is_never_airborne() -> None:
+    flight = log(1).recorded().changed(lambda v: 0.01 * v, "velocity_north", "velocity_east", "airspeed")
+    found = assess(flight)
+    assert words(found) == {CANNOT}
+    assert all("never airborne" in finding.reason for finding in found.findings)
+
+
+def test_a_bank_beyond_60_deg_is_no_turn() -> None:
+    flight = log(1).recorded()
+    steep = flight.changed(lambda bank: np.sign(bank) * math.radians(65.0), "bank")
+    assert "beyond 60 deg" in assess(steep)[RELATION].reason
+
+
+def test_a_clock_that_goes_back_is_refused() -> None:
+    flight = log(1).recorded()
+    bank = flight["bank"]
+    time = np.where(bank.time > 50.0, bank.time - 20.0, bank.time)
+    found = assess(flight.with_channel("bank", replace(bank, time=time)))
+    assert words(found) == {CANNOT}
+    assert all("goes back at" in finding.reason for finding in found.findings)
+
+
+def test_a_wind_that_changes_has_not_settled() -> None:
+    flight = log(2).recorded()
+    track = flight["velocity_north"]
+    later = track.time > 0.5 * (flight.begin + flight.end)
+    moved = flight.with_channel("velocity_north", replace(track, values=track.values + 5.0 * later))
+    assert "wind not settled" in assess(moved)[RELATION].reason
+
+
+def test_a_lag_of_telemetry_is_a_bound_and_one_on_board_an_interval() -> None:
+    flight = next(log(seed) for seed in range(20) if not log(seed).hidden.of_receipt and log(seed).hidden.lag > 0.1)
+    on_board = flight.recorded()
+    assert assess(on_board)[LAG.title].word == Verdict.FAILS
+    bound = assess(replace(on_board, of_receipt=True))[LAG.title]
+    assert bound.word == Verdict.UNDECIDED
+    assert bound.low == 0.0
+    assert "age of the telemetry" in bound.reason
+
+
+def test_a_command_at_rest_does_not_tell_the_lag() -> None:
+    flight = log(1).recorded().changed(np.zeros_like, "bank_command")
+    assert "not excited" in assess(flight)[LAG.title].reason
