@@ -1,19 +1,23 @@
 """Checks of a flight that involve more than one field: time steps, wind, target, airframe."""
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 import aircraft
+from harness.child import MEMORY, ChildError, limited
 from harness.error import did_you_mean
 from harness.flight import Flight, plant_of
-from harness.plants.plant import PlantError
+from harness.plants.ladder import PLANTS
+from harness.plants.plant import Plant, PlantError, Start
 from harness.toml_text import shown
 from harness.world.air import Air
 from harness.world.target import Target
 from harness.world.track import TrackError, load_track
 from harness.world.wind import HIGHEST, LOWEST
 
+_START_WITHIN = 15.0  # s, of what takes some milliseconds
 MOST_PERIODS = 4_000_000  # guidance periods of a flight: its log then takes 2 GB
 MOST_STEPS = 40_000_000  # steps of a flight: its gusts then take 2 GB
 
@@ -30,14 +34,55 @@ _OF_PLANT = ("plant", "aircraft", "step", "start.airspeed", "inner_loop.rate_tri
 
 
 def start_problems(flight: Flight) -> list[Problem]:
-    """Why the flight cannot start, which is tried in the steady wind. Of its airframe `problems` tells."""
+    """Why the flight cannot start, which is tried in the steady wind. Of its airframe `problems` tells.
+
+    A model of somebody else may end the process that loads it, so this is tried in a child.
+    """
     if _airframe_problems(flight):
         return []
+    plant, start, wind = plant_of(flight), flight.start, flight.wind.steady
+    if (model := model_of_another(flight)) is None:
+        problem = _cannot_start(plant, start, wind)
+    else:
+        problem = _cannot_start_apart(plant, start, wind, model, _changed(model))  # type: ignore[arg-type]  # a value
+    return [Problem(*problem, (*_OF_PLANT, "start.altitude", "wind.steady"))] if problem else []
+
+
+def model_of_another(flight: Flight) -> Path | None:
+    """The JSBSim model that the flight flies, if it does not come with the harness: such a model may do anything.
+
+    Raises FileNotFoundError for an unknown airframe.
+    """
+    if not PLANTS[flight.plant].has_body or flight.aircraft in aircraft.names():
+        return None
+    return aircraft.model(aircraft.folder(flight.aircraft))
+
+
+def _changed(file: Path) -> float:
+    """When the file was changed, s."""
+    return file.stat().st_mtime if file.exists() else math.nan
+
+
+def _cannot_start(plant: Plant, start: Start, wind: tuple[float, float]) -> tuple[str, str] | None:
+    """The setting to change, and why."""
     try:
-        plant_of(flight).start(flight.start, Air(steady=flight.wind.steady))
+        plant.start(start, Air(steady=wind))
     except PlantError as error:
-        return [Problem(error.key, str(error), (*_OF_PLANT, "start.altitude", "wind.steady"))]
-    return []
+        return error.key, str(error)
+    return None
+
+
+@lru_cache(maxsize=4096)  # flights of a matrix share their start
+def _cannot_start_apart(
+    plant: Plant, start: Start, wind: tuple[float, float], model: Path, changed: float
+) -> tuple[str, str] | None:
+    from harness.plants.sixdof import ModelError, parsed  # late: only this plant needs JSBSim
+
+    try:
+        parsed(model)
+        return limited("the start of the model", _START_WITHIN, MEMORY, _cannot_start, plant, start, wind)
+    except (ModelError, ChildError) as error:
+        return "aircraft", str(error)
 
 
 def problems(flight: Flight) -> list[Problem]:

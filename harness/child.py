@@ -4,11 +4,13 @@ A server is started once, which has imported what the first function needs; each
 milliseconds.
 """
 
+import math
 import multiprocessing
 import pickle
 import resource
 import signal
 import threading
+import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -28,9 +30,9 @@ Result = TypeVar("Result")
 class ChildError(HarnessError, RuntimeError):
     """The function gave no answer: `STAGE: cause`. The cause is a signal, too little memory, or too much time."""
 
-    def __init__(self, stage: str, cause: str) -> None:
+    def __init__(self, stage: str, cause: str, *, is_late: bool = False) -> None:
         super().__init__(f"{stage}: {cause}")
-        self.stage, self.cause = stage, cause
+        self.stage, self.cause, self.is_late = stage, cause, is_late
 
 
 def in_child(stage: str, function: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
@@ -50,19 +52,22 @@ def limited(
     *args: Given.args,
     **kwargs: Given.kwargs,
 ) -> Result:
-    """`in_child` with other limits: seconds on the clock, and bytes."""
-    _FORKS.set_forkserver_preload([function.__module__])  # of effect before the first call only
+    """`in_child` with other limits: bytes, and seconds on the clock, which each call of `alive` starts anew."""
+    modules = {function.__module__, *(type(given).__module__ for given in args)}
+    _FORKS.set_forkserver_preload(sorted(modules))  # of effect before the first call only
     answers, answer = _FORKS.Pipe(duplex=False)
     process = _FORKS.Process(target=_answer, args=(answer, seconds, memory, function, args, kwargs), daemon=True)
     process.start()
     answer.close()
     try:
-        if not answers.poll(seconds):
-            raise ChildError(stage, f"was not done in {seconds:g} s")
-        returned, value = answers.recv()
+        returned = None
+        while returned is None:
+            if not answers.poll(seconds):
+                raise ChildError(stage, f"was not done in {seconds:g} s", is_late=True)
+            returned, value = answers.recv()
     except EOFError:
         process.join()
-        raise ChildError(stage, _how_ended(process.exitcode)) from None
+        raise ChildError(stage, f"the process {how_ended(process.exitcode)}") from None
     finally:
         process.kill()
         process.join()
@@ -75,11 +80,27 @@ def limited(
     raise value
 
 
-def _how_ended(code: int | None) -> str:
+def how_ended(code: int | None) -> str:
+    """What the exit code of a process says, as the end of a sentence."""
     if code is not None and code < 0:
         names = {each.value: each.name for each in signal.Signals}
-        return f"the process was ended by {names.get(-code, f'signal {-code}')}"
-    return f"the process ended with exit code {code}"
+        return f"was ended by {names.get(-code, f'signal {-code}')}"
+    return f"ended with exit code {code}"
+
+
+# In the child
+
+_TELL_EVERY = 0.5  # s
+_NONE = (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)  # a file has no room for a byte, and nothing dumps a core
+_told: dict[str, Any] = {}  # where to answer, the limit in s, and when it was last told that the function goes on
+
+
+def alive(*_: object) -> None:
+    """Tells the parent that the function goes on, in a child; elsewhere nothing happens."""
+    if _told and time.monotonic() > _told["at"] + _TELL_EVERY:
+        _told["at"] = time.monotonic()
+        _limit_time(_told["seconds"])
+        _told["answer"].send((None, None))
 
 
 def _answer(
@@ -90,24 +111,27 @@ def _answer(
     args: tuple[Any, ...],
     kwargs: dict[str, Any],
 ) -> None:
-    """In the child: sends whether the function returned, and what it returned or raised."""
+    """Sends whether the function returned, and what it returned or raised."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=end_with_parent, daemon=True).start()
-    limits = {
-        resource.RLIMIT_AS: _address_space() + memory,
-        resource.RLIMIT_CPU: 1 + int(seconds),  # it holds also when the parent is gone
-        resource.RLIMIT_FSIZE: 0,
-        resource.RLIMIT_CORE: 0,
-    }
-    for what, most in limits.items():
+    for what, most in ((resource.RLIMIT_AS, _address_space() + memory), *((what, 0) for what in _NONE)):
         _, hard = resource.getrlimit(what)
         least = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(what, (least, least))
+    _limit_time(seconds)
+    _told.update(answer=answer, seconds=seconds, at=time.monotonic())
     try:
         message = pickle.dumps((True, function(*args, **kwargs)))
     except Exception as error:
         message = _pickled(error)
     answer.send_bytes(message)
+
+
+def _limit_time(seconds: float) -> None:
+    """The kernel ends this process when it has computed for so long from now, also when its parent is gone."""
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    soon = math.ceil(time.process_time() + seconds) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (soon if hard == resource.RLIM_INFINITY else min(soon, hard), hard))
 
 
 def _pickled(error: Exception) -> bytes:

@@ -155,7 +155,7 @@ def test_a_flight_that_kills_its_worker_is_one_row_and_costs_no_other(tmp_path: 
     assert (progress.done, progress.failed) == (40, 2)
     results = harness.load_results(tmp_path / "out").set_index("seed")
     assert results.index[results["outcome"] == "worker_died"].tolist() == [3, 17]
-    assert "exit code -9" in results["reason"][3]
+    assert "its worker was ended by SIGKILL" in results["reason"][3]
     alone = harness.load_results(tmp_path / "undisturbed").set_index("seed")
     others = results["outcome"] == "completed"
     assert others.sum() == 38

@@ -13,10 +13,11 @@ import pytest
 import harness
 from harness.files import content_hash
 from harness.runs.store import JOURNAL
-from tests.builders import copied_airframe, fly_matrix, write
+from tests import builders
+from tests.builders import WORKERS, copied_airframe, fly_matrix, write
 from tests.confined import Confined, Ended
 
-TEMPORARY = "standoff-harness-"  # begins the name of what a command removes when its process ends
+TEMPORARY = ("standoff-harness-", "pymp-")  # begin the names of what a command removes when its process ends
 
 SIXDOF = """\
 title = "A title"
@@ -246,3 +247,55 @@ def test_an_inner_loop_in_the_folder_of_an_airframe_is_refused(tmp_path: Path, c
     assert "JSBSim would read it instead of the inner loop of the harness" in told(
         confined.run(["fly", str(file)], tmp_path)
     )
+
+
+# Functions of JSBSim that end the process: each reads the other, and a division of whole numbers by 0 after 2 s.
+ENDLESS = """<system name="endless"><function name="a/c"><sum><property>a/d</property><value>1</value></sum></function>
+<function name="a/d"><sum><property>a/c</property><value>1</value></sum></function></system>"""
+BY_ZERO = """<system name="by zero"><channel name="c"><fcs_function name="a/b"><function><mod><value>7</value>
+<difference><value>3</value><floor><property>simulation/sim-time-sec</property></floor></difference></mod></function>
+</fcs_function></channel></system>"""
+NO_BODY = """<pointmass name="none"><weight unit="KG"> -20 </weight>
+<location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location></pointmass></mass_balance>"""
+
+
+def with_model(folder: Path, text: str, before: str = "</fdm_config>") -> Path:
+    """An airframe of somebody else as `folder`, whose model has this text too."""
+    airframe = copied_airframe("aerosonde", folder)
+    model = airframe / f"{airframe.name}.xml"
+    write(model, model.read_text(encoding="utf-8").replace(before, text if before in text else f"{text}{before}"))
+    return airframe
+
+
+def test_a_model_that_ends_the_process_at_its_start_is_one_line_of_every_command(tmp_path: Path) -> None:
+    with_model(tmp_path / "endless", ENDLESS)
+    file = write(tmp_path / "one.toml", SIXDOF.replace("[flight]", '[flight]\naircraft = "endless"'))
+    for ended in (builders.command("check", file), builders.command("run", file, "--out", tmp_path / "out")):
+        assert (ended.returncode, ended.stdout) == (2, "")
+        (line,) = ended.stderr.splitlines()
+        assert line.endswith("flight.aircraft: the start of the model: the process was ended by SIGSEGV")
+
+
+def test_a_model_that_ends_the_process_in_flight_is_a_row_with_the_reason(tmp_path: Path) -> None:
+    with_model(tmp_path / "late", BY_ZERO)
+    text = SIXDOF.replace("duration_s = 1.0", "duration_s = 4.0\nstart.airspeed_mps = 25.0")
+    text = text.replace('plant = ["kinematic", "sixdof"]', 'aircraft = ["aerosonde", "late"]')
+    file = write(tmp_path / "two.toml", text)
+    fly_matrix(file, tmp_path / "run", options=WORKERS)
+    rows = harness.load_results(tmp_path / "run")
+    assert rows["outcome"].tolist() == ["completed", "completed", "worker_died", "worker_died"]
+    assert rows["reason"].tolist()[2:] == ["its worker was ended by SIGFPE"] * 2
+    alone = builders.command(
+        "fly", write(tmp_path / "one.toml", text.partition("[matrix]")[0]), "--set", "aircraft=late"
+    )
+    assert alone.returncode == 1
+    assert "outcome: worker_died: the flight: the process was ended by SIGFPE" in alone.stdout
+
+
+def test_a_model_that_is_no_body_is_refused_once_it_is_loaded(tmp_path: Path) -> None:
+    with_model(tmp_path / "light", NO_BODY, before="</mass_balance>")
+    file = write(tmp_path / "one.toml", SIXDOF.replace("[flight]", '[flight]\naircraft = "light"'))
+    ended = builders.command("check", file)
+    assert "the mass of the model is -" in ended.stderr
+    assert "kg, must be above 0" in ended.stderr
+    assert ended.returncode == 2

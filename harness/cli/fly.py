@@ -57,11 +57,12 @@ def fly(
       harness fly experiments/stationary.toml --live --pace 10
       harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0] --against out/wind:3f2a
     """
+    from harness.checks import model_of_another
     from harness.cli._input import BadInput, flight_of, read_file, typed
     from harness.cli._paths import writable
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
-    from harness.loop import simulate
+    from harness.runs import apart
     from harness.runs.description import changes, ending, flown, metric_lines
     from harness.runs.recall import row_address
     from harness.runs.row import json_of, result_of, row
@@ -88,7 +89,7 @@ def fly(
     own = source_of(flight.law) is not None
     for warning in [*warnings(flight, of_circle=False), *(slowness(flight) if own else ())]:
         click.echo(f"warning: {warning}", err=True)
-    log = _watched(flight, stream) if own else simulate(flight, stream)
+    log = _watched(flight, stream) if own and model_of_another(flight) is None else apart.fly(flight, stream)
     if stream:
         stream.finish(log, typed())
         if stream.gone:

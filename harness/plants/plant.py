@@ -67,6 +67,9 @@ class End(Exception):  # noqa: N818 - an end is not an error
         super().__init__(reason)
         self.outcome = outcome
 
+    def __reduce__(self) -> tuple[type["End"], tuple[Outcome, str]]:  # a process may send it to another
+        return End, (self.outcome, str(self))
+
 
 class PlantError(HarnessError, ValueError):
     """The plant cannot start with these settings; `key` is the dotted name of the setting to change."""
@@ -74,6 +77,9 @@ class PlantError(HarnessError, ValueError):
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
         self.key = key
+
+    def __reduce__(self) -> tuple[type["PlantError"], tuple[str, str]]:  # a process may send it to another
+        return PlantError, (self.key, str(self))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -71,7 +71,7 @@ class ModelError(PlantError):
         super().__init__("aircraft", message)
 
 
-def _parsed(model: Path) -> ElementTree.Element:
+def parsed(model: Path) -> ElementTree.Element:
     """The root of a model, which reads no other file but the inner loop and writes none. Raises `ModelError`.
 
     What a model includes would be in no flight's key.
@@ -110,7 +110,7 @@ def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> jsbsim.FGF
     with TemporaryDirectory(prefix="harness-") as folder:
         copy = Path(folder) / airframe.name
         copy.mkdir()
-        model = deepcopy(_parsed(aircraft.model(airframe)))
+        model = deepcopy(parsed(aircraft.model(airframe)))
         _alter(model, errors)
         ElementTree.ElementTree(model).write(aircraft.model(copy), encoding="utf-8")
         return _load(copy, step)
@@ -146,7 +146,7 @@ def _alter(model: ElementTree.Element, errors: Errors) -> None:
 
 
 def _load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
-    model = _parsed(aircraft.model(airframe))
+    model = parsed(aircraft.model(airframe))
     _load_log.problems.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_dt(step)  # before the model: its components keep the step they were made with

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from harness.log import FlightLog
-from harness.loop import simulate
 from harness.plants.ladder import PLANTS
 from harness.review.reading import read_logs
+from harness.runs import apart
 from harness.runs.recall import RowAddress, fly_again, recall
 from harness.runs.recordings import recording_path
 from harness.runs.store import find, on_each_plant
@@ -38,7 +38,7 @@ def flight_of_row(folder: Path, beginning: str, say: Say) -> FlightLog:
     recalled = recall(RowAddress(folder, key))
     if not digest:
         say(f"{key}: ended in {stored.row['outcome']} without a log: flown again, with no digest to compare with")
-        return simulate(recalled.flight)
+        return apart.fly(recalled.flight)
     again = fly_again(recalled)
     if again.deviation:
         say(f"warning: {key}: differs from the stored flight ({recalled.changes}): {again.deviation}")
@@ -57,7 +57,7 @@ def pair_of_row(folder: Path, beginning: str, say: Say) -> list[FlightLog]:
             continue
         say(f"{plant}: not in {folder}: flown now")
         try:
-            logs.append(simulate(flight_from_document({**settings, "plant": plant})))
+            logs.append(apart.fly(flight_from_document({**settings, "plant": plant})))
         except (ValueError, SettingsError) as error:
             say(f"{plant}: left out, as the flight cannot start: {error}")
     return logs

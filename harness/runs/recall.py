@@ -15,7 +15,7 @@ from harness.files import content_hash, read
 from harness.flight import Flight
 from harness.key import version_of
 from harness.log import FlightLog
-from harness.loop import simulate
+from harness.runs import apart
 from harness.runs.row import FlightResult, result_of
 from harness.runs.store import Stored, StoreError, content, examples, find, reading
 from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
@@ -141,7 +141,7 @@ class Reflown(NamedTuple):
 
 def fly_again(recalled: Recalled) -> Reflown:
     """Flies the row's flight and compares it with the row. Raises ValueError when it cannot start."""
-    log = simulate(recalled.flight)
+    log = apart.fly(recalled.flight)
     return Reflown(log, deviation(recalled.stored, result_of(log)))
 
 

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 from pebble import ProcessExpired, ProcessPool
 
+from harness.child import how_ended
 from harness.error import HarnessError
 from harness.flight import Flight
 from harness.key import version_of
@@ -280,7 +281,7 @@ class _Flying:
             self.restarts = 0
             if chunk.hung is None:
                 code = getattr(error, "exitcode", None)
-                yield _failed(task, Outcome.WORKER_DIED, f"its worker ended with exit code {code}")
+                yield _failed(task, Outcome.WORKER_DIED, f"its worker {how_ended(code)}")
             else:
                 yield _failed(task, Outcome.TIMEOUT, _how_hung(chunk))
         else:  # between two flights: none of them is to blame
