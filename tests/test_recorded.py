@@ -173,6 +173,19 @@ def test_units_that_cannot_be_are_refused(tmp_path: Path) -> None:
     assert "looks like degrees" in told(tmp_path, rates)
 
 
+def test_noise_of_an_angle_does_not_look_like_degrees(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).normal(size=len(TIME))
+    assert "looks like degrees" not in told(tmp_path, {**COLUMNS, "roll": noise, "gx": 0.01 * noise[::-1]})
+
+
+def test_rows_that_come_faster_than_is_needed_are_averaged(tmp_path: Path) -> None:
+    fast = {"t": np.arange(0.0, 8000.0, 1.0)}
+    columns = {**fast, **{name: np.interp(fast["t"], COLUMNS["t"], COLUMNS[name]) for name in COLUMNS if name != "t"}}
+    flight = read_log([write_csv(tmp_path / "a.csv", columns)], str(write(tmp_path / "map.toml", MAP)))
+    assert (flight["bank"].rate, flight["bank"].rows) == (pytest.approx(100.0, rel=0.01), 8000)
+    assert flight["bank"].at(np.array([1.0])) == pytest.approx(0.4 * np.sin(1.0), abs=1e-3)
+
+
 def test_a_file_that_is_no_log_is_one_line(tmp_path: Path) -> None:
     empty, zeros = tmp_path / "empty.csv", tmp_path / "zeros.bin"
     empty.write_bytes(b"")

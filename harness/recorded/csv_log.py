@@ -114,7 +114,7 @@ def _table(path: Path, columns: Sequence[str], header: Sequence[str]) -> tuple[d
         raise LogError(f"{path}: cannot be read as CSV: {' '.join(str(error).split())}") from None
     if not rows:
         raise LogError(f"{path}: has a header and no rows")
-    return {column: np.concatenate(parts) for column, parts in pieces.items()}, max(0, _lines(path) - 1 - rows)
+    return {column: np.concatenate(pieces.pop(column)) for column in columns}, max(0, _lines(path) - 1 - rows)
 
 
 def _pieces(path: Path, columns: Sequence[str], header: Sequence[str]) -> Iterator[pd.DataFrame]:

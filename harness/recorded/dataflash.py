@@ -232,7 +232,7 @@ def _read(path: Path, content: mmap.mmap) -> RecordedFlight:
             time, rows = times[message.name]
             unit, factor = units.get(message.name, ""), factors.get(message.name, {})
             for name, (wanted, default, scale) in message.channels.items():
-                if wanted not in layout.fields:
+                if wanted not in layout.fields or name in draft.channels:
                     continue
                 k = layout.fields.index(wanted)
                 known = unit[k : k + 1]

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.recorded.recorded_flight import Array, Basis, LogError, RecordedFlight
+from harness.recorded.recorded_flight import Array, Basis, Channel, LogError, RecordedFlight
 
 # What an aircraft that flies reaches at most; of a few values a log may say anything.
 MOST: Mapping[str, float] = MappingProxyType(
@@ -21,6 +21,9 @@ _SHARE = 90.0  # percentile that is compared
 _SAID = "looks like degrees; the map gives its unit"
 _DEGREES = 180.0 / np.pi
 _BETWEEN = (0.3 * _DEGREES, 3.0 * _DEGREES)  # how much larger degrees are, with all that is not exact
+_SPAN = 0.4  # s
+_FEWEST = 8  # spans
+_ALIKE = 0.7  # correlation: an angle is compared with the rate that turns it
 _PAIRS = (("bank", "roll_rate"), ("pitch", "pitch_rate"))
 
 
@@ -45,35 +48,35 @@ def _too_large(flight: RecordedFlight) -> Iterator[str]:
 
 
 def _against_rates(flight: RecordedFlight) -> Iterator[str]:
-    """An angle that changes some 57 times as fast as its rate says, or as slowly."""
+    """An angle that changes some 57 times as much as its rate says, or as little."""
     for angle, rate in _PAIRS:
-        if not flight.has(angle, rate) or len(flight[angle]) < 20:
+        if not flight.has(angle, rate):
             continue
-        time, values = flight[angle].time, flight[angle].values
-        middle = 0.5 * (time[1:] + time[:-1])
-        changes, rates = np.diff(values) / np.diff(time), flight[rate].at(middle)
-        known = np.isfinite(rates) & (np.diff(time) < 1.0)
-        if np.count_nonzero(known) < 20:
+        turned, told = _turned(flight[angle], flight[rate])
+        if len(turned) < _FEWEST or np.std(told) == 0.0 or np.std(turned) == 0.0:
             continue
-        change, told = _spread(changes[known]), _spread(rates[known])
-        if _looks_like_degrees(change, told):
+        ratio = float(np.std(turned) / np.std(told))
+        if np.corrcoef(turned, told)[0, 1] < _ALIKE:
+            continue
+        if _BETWEEN[0] < ratio < _BETWEEN[1]:
             yield (
-                f"{flight[angle].source}: {angle} changes {change / told:.0f} times as fast as {rate} says: "
+                f"{flight[angle].source}: {angle} changes {ratio:.0f} times as much as {rate} says: "
                 f"{angle} looks like degrees, or {rate} was radians already"
             )
-        elif _looks_like_degrees(told, change):
+        elif _BETWEEN[0] < 1.0 / ratio < _BETWEEN[1]:
             yield (
-                f"{flight[rate].source}: {rate} is {told / change:.0f} times what {angle} changes by: "
+                f"{flight[rate].source}: {rate} is {1.0 / ratio:.0f} times what {angle} changes by: "
                 f"{rate} looks like degrees, or {angle} was radians already"
             )
 
 
-def _looks_like_degrees(large: float, small: float) -> bool:
-    return small > 1e-4 and _BETWEEN[0] < large / small < _BETWEEN[1] and large > 0.3
-
-
-def _spread(values: Array) -> float:
-    return float(np.percentile(np.abs(values), _SHARE))
+def _turned(angle: Channel, rate: Channel) -> tuple[Array, Array]:
+    """What the angle changes by in spans of `_SPAN`, and what the rate adds up to in them; rad."""
+    time = np.arange(max(angle.time[0], rate.time[0]), min(angle.time[-1], rate.time[-1]), _SPAN)
+    total = np.append(0.0, np.cumsum(0.5 * np.diff(rate.time) * (rate.values[1:] + rate.values[:-1])))
+    turned, told = np.diff(angle.at(time)), np.diff(np.interp(time, rate.time, total))
+    known = np.isfinite(turned)
+    return turned[known], told[known]
 
 
 def _gravity(flight: RecordedFlight) -> Iterator[str]:

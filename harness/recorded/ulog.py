@@ -2,13 +2,14 @@
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pyulog import ULog
 
 from harness.recorded.draft import Draft
@@ -141,12 +142,12 @@ def read_ulog(path: Path) -> RecordedFlight:
         key: float(value) for key, value in log.initial_parameters.items() if isinstance(value, int | float)
     }
     _tell_damage(draft, log, path)
-    data: dict[str, tuple[Array, dict[str, Array]]] = {}
+    data: dict[str, tuple[Array, Mapping[str, Array]]] = {}
     for one in log.data_list:
         if one.multi_id == min(d.multi_id for d in log.data_list if d.name == one.name) and "timestamp" in one.data:
             time = one.data["timestamp"].astype(float) * 1e-6
             rows = draft.in_order(time, f"{path.name}: {one.name}")
-            data[one.name] = time[rows], {k: v[rows] for k, v in one.data.items()}
+            data[one.name] = time[rows], _Ordered(one.data, rows)
     for topic in TOPICS:
         if topic.name in data:
             _add(draft, topic, *data[topic.name])
@@ -155,11 +156,28 @@ def read_ulog(path: Path) -> RecordedFlight:
     return draft.finished()
 
 
-def _add(draft: Draft, topic: Topic, time: Array, fields: dict[str, Array]) -> None:
-    known = {name: values.astype(float) for name, values in fields.items() if name != "timestamp"}
+class _Ordered(Mapping[str, Array]):
+    """The fields of a topic, each as numbers in the order of their times when it is asked for."""
+
+    def __init__(self, fields: Mapping[str, Array], rows: NDArray[np.intp]) -> None:
+        self._fields, self._rows = fields, rows
+
+    def __getitem__(self, name: str) -> Array:
+        return self._fields[name][self._rows].astype(float)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __len__(self) -> int:
+        return len(self._fields)
+
+
+def _add(draft: Draft, topic: Topic, time: Array, fields: Mapping[str, Array]) -> None:
     for name, what in topic.channels.items():
+        if name in draft.channels:
+            continue
         try:
-            values = known[what] if isinstance(what, str) else what(known)
+            values = fields[what] if isinstance(what, str) else what(fields)
         except KeyError:  # this version of PX4 has another field
             continue
         if np.isfinite(values).any():
