@@ -18,6 +18,7 @@ from harness.recorded.recorded_flight import (
 )
 
 FASTEST = 100.0  # 1/s: rows that come faster are averaged, so that a long log takes no large memory
+LARGEST, LARGEST_TIME = 1e9, 1e11  # SI: a larger number is none
 DISORDER = 1.0  # s: rows that come so much too late are put in order; beyond it the clock was set back
 
 
@@ -41,11 +42,12 @@ class Draft:
         """Adds a channel, unless a better source gave it before. `time` increases: see `in_order`."""
         if name in self.channels:
             return
-        finite = np.isfinite(values)
+        finite = np.abs(values) < LARGEST  # neither is a NaN
         if missing := int(np.count_nonzero(~finite)):
             self.problems.append(f"{source}: {missing} of {len(values)} values of {name} are no numbers, and left out")
+        time, values = time[finite], values[finite]
         if name in DIRECTIONS:
-            time, values = time[finite], np.unwrap(values[finite])
+            values = np.unwrap(values)
         rows = len(time)
         time, values = _slower(time, values, basis)
         if len(channel := sampled(time, values, basis, source, note)):
@@ -53,7 +55,7 @@ class Draft:
 
     def in_order(self, time: Array, source: str) -> NDArray[np.intp]:
         """The rows whose times increase, in that order. What is left out, or out of order, becomes a problem."""
-        rows = np.flatnonzero(np.isfinite(time))
+        rows = np.flatnonzero(np.abs(time) < LARGEST_TIME)
         if missing := len(time) - len(rows):
             self.problems.append(f"{source}: {missing} of {len(time)} rows have no time, and are left out")
         t = time[rows]
