@@ -1,5 +1,6 @@
 """What a recorded flight says of the assumption, and what is refused: logs of the harness's own flights, and none."""
 
+import json
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -10,8 +11,10 @@ import pytest
 from benchmarks.blind_logs import SCALE, TURN, WIND, BlindLog, blind_log, compared
 from harness.recorded.assessment import CANNOT, LAG, LATERAL, Assessment, assess
 from harness.recorded.recorded_flight import Basis, LoggedEvent, RecordedFlight, sampled
+from harness.recorded.said import as_json, lines
 from harness.verdict.parts import PARTS
 from harness.vocabulary import Verdict
+from tests.builders import invoke
 
 LEVEL, AIRSPEED, SIDESLIP = (
     PARTS[column].title for column in ("altitude_deviation_peak_m", "airspeed_deviation", "sideslip_rms_deg")
@@ -153,3 +156,12 @@ def test_a_lag_of_telemetry_is_a_bound_and_one_on_board_an_interval() -> None:
 def test_a_command_at_rest_does_not_tell_the_lag() -> None:
     flight = log(1).recorded().changed(np.zeros_like, "bank_command")
     assert "not excited" in assess(flight)[LAG.title].reason
+
+
+def test_a_log_too_short_to_judge_is_one_sentence_and_a_longer_one_a_table() -> None:
+    said = invoke("assess", "experiments/flights/lateral_doublet_4.csv").output
+    assert "The assumption cannot be judged from this log: airborne for 6.5 s at most" in said
+    found = assess(log(2).recorded())
+    table = "\n".join(lines(found))
+    assert all(name in table for name in ("turn relation", "no vane", "wind, by the track"))
+    json.dumps(as_json(found), allow_nan=False)

@@ -17,12 +17,13 @@ from harness.cli._paths import PATH
 @click.option("--to", "end", type=float, default=math.inf, help="Leave out what comes after, s.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 def assess(logs: tuple[Path, ...], map_name: str | None, begin: float, end: float, as_json: bool) -> None:
-    """Read the log of a real flight, and say what it holds.
+    """Judge the assumption on the log of a real flight.
 
     LOG is a ULog file (PX4), a DataFlash file (ArduPilot), or CSV files of one flight; a folder stands for the logs in
     it. Prints each channel: how often its value really changes, since logs repeat rows; whether it was measured,
-    estimated by a filter, commanded or derived; and what is wrong with the log. The time is in seconds since the log's
-    first row.
+    estimated by a filter, commanded or derived; and what is wrong with the log. Then what the flight says of each part
+    of the assumption, in the words and within the margins of harness compare, with an interval over independent windows
+    of flight; and what it cannot say, with the reason. The time is in seconds since the log's first row.
 
     \b
     Examples:
@@ -32,7 +33,8 @@ def assess(logs: tuple[Path, ...], map_name: str | None, begin: float, end: floa
     import json
 
     from harness.cli._input import BadInput
-    from harness.recorded import contents
+    from harness.recorded import contents, said
+    from harness.recorded.assessment import assess as assessed
     from harness.recorded.read import read_log
 
     if not begin < end:
@@ -41,8 +43,9 @@ def assess(logs: tuple[Path, ...], map_name: str | None, begin: float, end: floa
     flight = whole.between(begin, end)
     if not flight.channels:
         raise BadInput(f"--from {begin:g} --to {end:g}: the log goes from {whole.begin:.2f} to {whole.end:.2f} s")
+    found = assessed(whole, begin, end)
     if as_json:
-        click.echo(json.dumps(contents.as_json(flight), indent=2))
+        click.echo(json.dumps({**contents.as_json(flight), "assessment": said.as_json(found)}, indent=2))
         return
-    for line in contents.contents(flight):
+    for line in (*contents.contents(flight), "", *said.lines(found)):
         click.echo(line)

@@ -50,7 +50,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },
         "Real flights": {
-            "assess": Entry("assess:assess", "Read the log of a real flight, and say what it holds."),
+            "assess": Entry("assess:assess", "Judge the assumption on the log of a real flight."),
         },
         "The paper": {
             "demo": Entry("demo:demo", "Fly the paper's first case, two laws on three aircraft, and compare."),

@@ -1,0 +1,83 @@
+"""An assessment as lines and as numbers for a program."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from harness.recorded.assessment import CANNOT, Assessment, PartFinding
+from harness.tables import number, table
+from harness.vocabulary import Verdict
+
+
+def lines(found: Assessment) -> Iterator[str]:
+    """What the flight says of the assumption, and what it does not say."""
+    judged = [finding for finding in found.findings if finding.word != CANNOT]
+    refused = [finding for finding in found.findings if finding.word == CANNOT]
+    reasons = {finding.reason for finding in refused}
+    if not judged and len(reasons) == 1:
+        yield f"The assumption {CANNOT}: {reasons.pop()}."
+        return
+    if judged:
+        yield f"What the flight from {found.begin:.1f} to {found.end:.1f} s says of the assumption:"
+        yield ""
+        headings = ["part", "it", "value", "95 % interval", "unit", "windows", ""]
+        yield from table(headings, map(_row, judged), "llrrlrl")
+        yield ""
+        yield from _wind(found)
+        yield from found.notes
+    if refused:
+        yield ""
+        yield f"What {CANNOT}:"
+        yield from table([], ([f"  {finding.part.title}", finding.reason] for finding in refused), "ll")
+
+
+def _row(finding: PartFinding) -> list[str]:
+    bound = finding.word == Verdict.UNDECIDED and finding.low == 0.0
+    interval = "" if bound else f"{number(finding.low)} to {number(finding.high)}"
+    reason = finding.reason
+    if finding.needed:
+        reason = f"{reason}: {finding.needed} windows like these would decide"
+    value = f"{'<= ' if bound else ''}{number(finding.value)}"
+    return [finding.part.title, finding.word, value, interval, finding.part.unit, str(finding.windows), reason]
+
+
+def _wind(found: Assessment) -> Iterator[str]:
+    if not found.wind:
+        return
+    parts = [
+        f"{number(value)} [{number(low)}, {number(high)}] m/s to the {towards}"
+        for towards, (value, low, high) in (("north", found.wind.north), ("east", found.wind.east))
+    ]
+    yield f"wind, by the {found.wind.source}: the air moves {parts[0]}, {parts[1]}"
+
+
+def as_json(found: Assessment) -> dict[str, Any]:
+    """The same for a program; SI, rad."""
+    return {
+        "begin_s": found.begin,
+        "end_s": found.end,
+        "findings": [
+            {
+                "part": finding.part.title,
+                "unit": finding.part.unit,
+                "word": str(finding.word),
+                "reason": finding.reason,
+                "value": _known(finding.value),
+                "low": _known(finding.low),
+                "high": _known(finding.high),
+                "windows": finding.windows,
+                "windows_needed": finding.needed,
+            }
+            for finding in found.findings
+        ],
+        "wind": asdict(found.wind) if found.wind else None,
+        "autopilots_wind": {name: _known(value) for name, value in asdict(found.estimated).items()}
+        if found.estimated
+        else None,
+        "notes": list(found.notes),
+    }
+
+
+def _known(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
