@@ -1,5 +1,8 @@
 """The airframes: one folder each, with a JSBSim model and the data from which it was written."""
 
+import hashlib
+import json
+import re
 import tomllib
 from collections.abc import Callable
 from functools import lru_cache
@@ -54,6 +57,51 @@ def identified(airframe: Path) -> Path:
     return airframe / "identified.toml"
 
 
+def argument(airframe: Path) -> str:
+    """What a user types for the airframe: the name of one that is shipped, otherwise its folder."""
+    return airframe.name if airframe.parent == FOLDER else str(airframe)
+
+
+def written(airframe: Path) -> Path:
+    """The path of the file that says from which data the model was written."""
+    return airframe / "written.toml"
+
+
+def keep_written(airframe: Path) -> None:
+    """Notes that the model belongs to the data as they are now. Raises `AirframeError` and OSError."""
+    about = (
+        "# Written with the model: a hash of airframe.toml and inner_loop.toml, that a change of them is not missed.\n"
+    )
+    written(airframe).write_text(f'{about}data = "{_data_hash(airframe)}"\n', encoding="utf-8")
+
+
+def is_stale(airframe: Path) -> bool:
+    """Whether the data have changed since the model was written from them. Raises `AirframeError`.
+
+    The model itself may be edited. Where nothing says from which data it was written, it is compared with the model
+    that they make.
+    """
+    data(airframe), inner_loop(airframe)  # raises for what is no data
+    if written(airframe).is_file():
+        return bool(_read(written(airframe)).get("data") != _data_hash(airframe))
+    if "adopted" in data(airframe):
+        return False
+    from aircraft.write_models import jsbsim_model  # late: no other airframe needs the template
+
+    now = model(airframe).read_text(encoding="utf-8", errors="replace")
+    return _nameless(now) != _nameless(jsbsim_model(airframe))
+
+
+def _nameless(model: str) -> str:
+    """The model without its name, for a folder may be renamed."""
+    return re.sub('<fdm_config name="[^"]*"', "<fdm_config", model)
+
+
+def _data_hash(airframe: Path) -> str:
+    """A hash, 32 hex digits, of the data: of what they say, not of their comments."""
+    return _hashed(_text(airframe / "airframe.toml"), _text(airframe / "inner_loop.toml"))
+
+
 def data(airframe: Path) -> dict[str, Any]:
     """The published data of an airframe; SI, rad; each number with its source. Raises `AirframeError`."""
     return _read(airframe / "airframe.toml")
@@ -92,18 +140,30 @@ def _numbers(file: Path) -> Callable[..., float]:
 
 
 def _read(file: Path) -> dict[str, Any]:
+    text = _text(file)
+    try:
+        return _parsed(text)
+    except (ValueError, RecursionError) as error:
+        raise AirframeError(f"{file}: not valid TOML: {error}") from None
+
+
+def _text(file: Path) -> str:
     try:
         if file.exists() and not file.is_file():
             raise AirframeError(f"{file}: must be a file")
-        return _parsed(file.read_text(encoding="utf-8"))
-    except AirframeError:
-        raise
+        return file.read_text(encoding="utf-8")
     except OSError as error:
         raise AirframeError(f"{file}: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
+    except UnicodeDecodeError as error:
         raise AirframeError(f"{file}: not valid TOML: {error}") from None
 
 
 @lru_cache(maxsize=16)
 def _parsed(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
+
+
+@lru_cache(maxsize=16)
+def _hashed(*texts: str) -> str:
+    content = json.dumps([tomllib.loads(text) for text in texts], sort_keys=True, default=str)
+    return hashlib.blake2b(content.encode(), digest_size=16).hexdigest()

@@ -149,6 +149,12 @@ def airframe_of(name: str) -> Path:
         allowed = f"must be one of {', '.join(known)}, or a folder"
         raise ValueError(f"is {shown(name)}, {allowed}{did_you_mean(name, known)}") from None
     aircraft.limits(airframe)
+    if aircraft.is_stale(airframe):
+        model, again = aircraft.model(airframe).name, f"python -m aircraft.write_models {aircraft.argument(airframe)}"
+        raise ValueError(
+            f"{airframe}: {model} was not written from airframe.toml and inner_loop.toml as they are: run `{again}`, "
+            f"with --keep to fly {model} as it is"
+        )
     return airframe
 
 

@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 
 import aircraft
 from aircraft.write_models import jsbsim_model
+from aircraft.write_models import main as write_models
+from harness.checks import airframe_of
 from harness.plants.plant import Start
-from harness.plants.sixdof import FT, SLUG, NoTrimError, engage, load, trim
+from harness.plants.sixdof import FT, SLUG, ModelError, NoTrimError, engage, load, trim
 from harness.world.air import Air
+from tests.builders import copied_airframe, write
 
 LBF = 4.4482216152605  # N
 AIRFRAMES = aircraft.names()
@@ -212,3 +215,75 @@ def test_a_folder_laid_out_alike_is_an_airframe(tmp_path: Path) -> None:
     (mine / "inner_loop.toml").write_bytes((given / "inner_loop.toml").read_bytes())
     (mine / "mine.xml").write_text(jsbsim_model(mine), encoding="utf-8")
     assert trim(load(aircraft.folder(str(mine)), STEP), design_start("skywalker_x8"), Air()).throttle > 0
+
+
+def edited(airframe: Path, name: str, before: str, after: str) -> None:
+    text = (airframe / name).read_text(encoding="utf-8")
+    assert before in text
+    write(airframe / name, text.replace(before, after))
+
+
+@pytest.mark.parametrize("name", ["airframe.toml", "inner_loop.toml"])
+@pytest.mark.parametrize("noted", [True, False])
+def test_edited_data_are_refused_until_the_model_is_written_from_them_or_kept(
+    name: str, noted: bool, tmp_path: Path
+) -> None:
+    mine = copied_airframe("ultra_stick_25e", tmp_path / "mine")
+    if not noted:
+        aircraft.written(mine).unlink()
+    assert airframe_of(str(mine)) == mine
+    data = aircraft.inner_loop(mine)["gain"]
+    gain = next(iter(data))
+    changes = {
+        "airframe.toml": ("m = { v = 1.959", "m = { v = 2.3"),
+        "inner_loop.toml": (f"{gain} = {{", f"{gain} ={{"),
+    }
+    edited(mine, name, *changes[name])
+    edited(mine, name, "\n[", "\n# a comment\n[")
+    if name == "inner_loop.toml":
+        assert not aircraft.is_stale(mine)  # the same numbers, otherwise written
+        edited(mine, name, f"{gain} ={{ v = {data[gain]['v']}", f"{gain} = {{ v = {2.0 * data[gain]['v']}")
+    told = f"mine.xml was not written from airframe.toml .* run `python -m aircraft.write_models {mine}`, with --keep"
+    with pytest.raises(ValueError, match=told):
+        airframe_of(str(mine))
+    before = load(mine, STEP)
+    write_models([str(mine)])
+    after = load(airframe_of(str(mine)), STEP)
+    of = "inertia/empty-weight-lbs" if name == "airframe.toml" else f"inner-loop/gain/{gain}"
+    assert before[of] != after[of]
+    edited(mine, "airframe.toml", "alpha_stall", "beta_stall = { v = 0.1 }\nalpha_stall")
+    assert aircraft.is_stale(mine)
+    model = aircraft.model(mine).read_bytes()
+    write_models(["--keep", str(mine)])
+    assert airframe_of(str(mine)) == mine
+    assert aircraft.model(mine).read_bytes() == model
+
+
+def test_an_edited_model_is_checked_and_flown(tmp_path: Path) -> None:
+    mine = copied_airframe("aerosonde", tmp_path / "mine")
+    edited(mine, "mine.xml", '<emptywt unit="KG"> 11', '<emptywt unit="KG"> 12')
+    assert SLUG * load(airframe_of(str(mine)), STEP)["inertia/mass-slugs"] != pytest.approx(11.0, abs=0.5)
+    edited(mine, "mine.xml", '<emptywt unit="KG"> 12', '<emptywt unit="KG"> -12')
+    with pytest.raises(ModelError, match=r"mine\.xml:\d+: <emptywt> is -12"):
+        load(mine, STEP)
+
+
+def test_write_models_writes_what_it_is_told_and_says_what_it_cannot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine = copied_airframe("aerosonde", tmp_path / "a & b")
+    aircraft.model(mine).unlink()
+    monkeypatch.chdir(tmp_path)
+    write_models(["a & b"])
+    assert capsys.readouterr().out == f"wrote {aircraft.model(mine)}\n"
+    assert load(mine, STEP)["inertia/ixx-slugs_ft2"] == 0.0
+    shipped = aircraft.model(aircraft.folder("aerosonde"))
+    before = shipped.read_bytes()
+    write_models(["aerosonde"])
+    assert (capsys.readouterr().out, shipped.read_bytes()) == (f"wrote {shipped}\n", before)
+    edited(mine, "airframe.toml", "Ixx", "Ixxx")
+    for words, told in ((["a & b"], "has no attribute 'Ixx'"), (["unknown"], "unknown: must be one of aerosonde, ")):
+        with pytest.raises(SystemExit, match="2"):
+            write_models(words)
+        (line,) = capsys.readouterr().err.splitlines()
+        assert told in line

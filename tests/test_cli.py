@@ -126,7 +126,7 @@ def test_what_the_airframe_cannot_do_is_one_line_and_exit_code_2(file: Path, set
     ("broken", "old", "new", "told"),
     [
         ("plane.xml", "aero/q-hat </property>", "aero/q-hut </property>", "plane.xml: unknown properties aero/q-hut"),
-        ("plane.xml", "</fdm_config>", "", "plane.xml: "),
+        ("plane.xml", "</fdm_config>", "", "plane.xml:"),
         ("airframe.toml", "[meta]", "[meta", "airframe.toml: not valid TOML"),
         ("airframe.toml", "alpha_stall", "alpha_stal", "airframe.toml: aero.alpha_stall.v must be a number"),
         ("inner_loop.toml", "[limit]", "[limits]", "inner_loop.toml: limit.bank-rad.v must be a number"),

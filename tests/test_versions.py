@@ -1,5 +1,6 @@
 """What decides a flight beside its settings: files by their content, whose change makes another flight and is told."""
 
+import json
 import os
 import shutil
 import sqlite3
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 
 import harness
+from harness.files import content_hash
 from harness.runs.results import versions
 from harness.runs.store import JOURNAL
 from tests.builders import (
@@ -50,6 +52,20 @@ def test_a_moved_or_linked_project_with_its_own_airframe_keeps_its_keys(tmp_path
     data = moved / "mine" / "airframe.toml"
     data.write_text(data.read_text() + "\n# changed\n")
     assert fly_matrix(moved / "matrix.toml", moved / "out").done == 2
+
+
+def test_the_journal_has_the_content_of_every_file_that_a_flight_read(tmp_path: Path) -> None:
+    copied_airframe("aerosonde", tmp_path / "mine")
+    text = MATRIX.replace("duration_s", 'aircraft = "mine"\nduration_s').replace("count = 5", "count = 1")
+    fly_matrix(write(tmp_path / "matrix.toml", text.replace('"kinematic", ', '"lagged", ')), tmp_path / "out")
+    shutil.rmtree(tmp_path / "mine")
+    with closing(sqlite3.connect(tmp_path / "out" / JOURNAL)) as journal:
+        files = dict(journal.execute("SELECT hash, content FROM files"))
+        decides = [json.loads(text)["content"] for (text,) in journal.execute("SELECT decides FROM versions")]
+    for name in ("identified.toml", "model", "airframe.toml", "inner_loop.toml"):
+        assert {f"aircraft/{name}" in each for each in decides} >= {True}, name
+    for content in decides:
+        assert {digest: content_hash(files[digest]) for digest in content.values()} == {d: d for d in content.values()}
 
 
 def test_rows_of_another_version_are_marked(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,7 +74,7 @@ def identified(airframe: Path, airspeed: float) -> Identified:
         at = f"identified at {speeds} m/s" if known else "not identified"
         raise IdentifiedError(
             f"{airframe.name} is {at}, the flight is at {airspeed:g} m/s: "
-            f"run harness identify {airframe_argument(airframe)} --airspeed {airspeed:g} --keep"
+            f"run harness identify {aircraft.argument(airframe)} --airspeed {airspeed:g} --keep"
         )
     return near
 
@@ -88,7 +88,7 @@ def read(airframe: Path) -> list[Identified]:
         tables = tables_of(file.read_text(encoding="utf-8"))["at"]
         return sorted((_from(table) for table in tables), key=lambda entry: entry.airspeed)
     except (AttributeError, LookupError, TypeError, ValueError, ArithmeticError) as error:
-        again = f"run harness identify {airframe_argument(airframe)} --keep"
+        again = f"run harness identify {aircraft.argument(airframe)} --keep"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
 
 
@@ -107,7 +107,7 @@ def model_digest(airframe: Path) -> str:
 
 def document(airframe: Path, known: list[Identified]) -> str:
     """The text of `identified.toml` with these identifications."""
-    command = f"harness identify {airframe_argument(airframe)}"
+    command = f"harness identify {aircraft.argument(airframe)}"
     lines = [
         f"# Written by `{command}`: what the plants lagged and coordinated fly by. SI, rad.",
         "",
@@ -156,8 +156,3 @@ def _sweep(table: Mapping[str, Any]) -> Sweep:
 
 def _numbers(table: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, value in table.items()}
-
-
-def airframe_argument(airframe: Path) -> str:
-    """What a user types for the airframe: the name of one that is shipped, otherwise its folder."""
-    return airframe.name if airframe.parent == aircraft.FOLDER else str(airframe)

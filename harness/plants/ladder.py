@@ -112,11 +112,11 @@ def _sixdof_files(airframe: Path) -> Mapping[str, Path]:
 
 
 def _identification_warnings(setup: Setup) -> list[str]:
-    from harness.plants.identified import airframe_argument, is_stale
+    from harness.plants.identified import is_stale
 
     warnings = []
     if is_stale(setup.airframe):
-        again = f"run harness identify {airframe_argument(setup.airframe)} --keep"
+        again = f"run harness identify {aircraft.argument(setup.airframe)} --keep"
         warnings.append(f"{setup.airframe.name} has changed since it was identified: {again}")
     if not setup.rate_trim:
         warnings.append("rate_trim = false changes the plant sixdof only: this plant has no shortfall of turn rate")

@@ -180,7 +180,10 @@ def _airframe(folder: Path, name: str, then: Mapping[str, str]) -> str:
         if all(_hash(path) == kept[n] for n, path in paths.items()):
             return name
     base = _last_name(folder, "aircraft", name)
-    return str(_unpacked(folder, {f"{base}.xml" if n == "model" else n: d for n, d in kept.items()}, base))
+    unpacked = _unpacked(folder, {f"{base}.xml" if n == "model" else n: d for n, d in kept.items()}, base)
+    with suppress(aircraft.AirframeError):  # its files say what is wrong with them when they are read
+        aircraft.keep_written(unpacked)
+    return str(unpacked)
 
 
 def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Path:
