@@ -140,6 +140,9 @@ CALLS: Mapping[str, Sequence[str]] = {
     "assess": [
         "LOG", "LOG --map MAP", "LOG --from WORD", "LOG --json --from 1 --to 2", "LOG --map WORD", "WORD --map MAP",
     ],
+    "validate": [
+        "AIRFRAME --with LOG --map MAP", "aerosonde --with LOG", "WORD --with LOG", "aerosonde --with LOG --save WORD",
+    ],
     "init": ["OUT/a.toml", "FILE", "OUT/WORD", "--law OUT/a.py", "--law LAW"],
     "run": [
         "MATRIX --dry-run", "FILE --dry-run --set SET", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --set SET",

@@ -51,6 +51,9 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
         },
         "Real flights": {
             "assess": Entry("assess:assess", "Judge the assumption on the log of a real flight."),
+            "validate": Entry(
+                "validate:validate", "Replay the recorded surface commands of a flight on an airframe's model."
+            ),
         },
         "The paper": {
             "demo": Entry("demo:demo", "Fly the paper's first case, two laws on three aircraft, and compare."),

@@ -7,7 +7,7 @@ from typing import Any
 from harness.recorded.recorded_flight import QUANTITIES, Channel, RecordedFlight
 from harness.tables import number, table
 
-_SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi)}
+SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi)}
 
 
 def contents(flight: RecordedFlight) -> Iterator[str]:
@@ -55,7 +55,7 @@ def as_json(flight: RecordedFlight) -> dict[str, Any]:
 
 def _row(name: str, flight: RecordedFlight) -> list[str]:
     channel = flight[name]
-    unit, scale = _SHOWN.get(QUANTITIES[name].unit, (QUANTITIES[name].unit, 1.0))
+    unit, scale = SHOWN.get(QUANTITIES[name].unit, (QUANTITIES[name].unit, 1.0))
     span = channel.time[-1] - channel.time[0]
     what = ", ".join(filter(None, (channel.basis, channel.note)))
     least, greatest = (number(float(value), scale) for value in (channel.values.min(), channel.values.max()))
