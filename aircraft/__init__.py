@@ -1,7 +1,11 @@
-"""The airframes: one folder each, with a JSBSim model and the data from which it was written."""
+"""The airframes: one folder each, with a JSBSim model and the data from which it was written.
+
+The aircraft of a recorded flight is a file: what was fitted to its log, and nothing to fly with six degrees of freedom.
+"""
 
 import hashlib
 import json
+import math
 import re
 import tomllib
 from collections.abc import Callable
@@ -10,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 FOLDER = Path(__file__).parent
+RECORDED = "recorded.toml"  # how a store names the aircraft of a recorded flight
 
 
 class AirframeError(ValueError):
@@ -32,7 +37,12 @@ def names() -> list[str]:
 
 
 def folder(name: str) -> Path:
-    """The folder of an airframe, by its name or by a path to a folder with the same files. Else FileNotFoundError."""
+    """The folder of an airframe, by its name or by a path to a folder with the same files. Else FileNotFoundError.
+
+    Of a recorded flight's aircraft it is the file.
+    """
+    if is_recorded(name):
+        return Path(name).resolve()
     for candidate in (FOLDER / name, Path(name)):
         if (candidate / "airframe.toml").is_file() and model(candidate).is_file():
             return candidate.resolve()
@@ -47,6 +57,14 @@ def is_folder(name: str | Path) -> bool:
         return False
 
 
+def is_recorded(name: str | Path) -> bool:
+    """Whether it is the path of a file, with the aircraft of a recorded flight; False for text that is no path."""
+    try:
+        return Path(name).suffix == ".toml" and Path(name).is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def model(airframe: Path) -> Path:
     """The path of the JSBSim model in the folder of an airframe."""
     return airframe / f"{airframe.name}.xml"
@@ -54,7 +72,7 @@ def model(airframe: Path) -> Path:
 
 def identified(airframe: Path) -> Path:
     """The path of the file in which `harness identify` keeps its results for an airframe."""
-    return airframe / "identified.toml"
+    return airframe if is_recorded(airframe) else airframe / "identified.toml"
 
 
 def argument(airframe: Path) -> str:
@@ -81,6 +99,8 @@ def is_stale(airframe: Path) -> bool:
     The model itself may be edited. Where nothing says from which data it was written, it is compared with the model
     that they make.
     """
+    if is_recorded(airframe):
+        return False
     data(airframe), inner_loop(airframe)  # raises for what is no data
     if written(airframe).is_file():
         return bool(_read(written(airframe)).get("data") != _data_hash(airframe))
@@ -114,6 +134,9 @@ def inner_loop(airframe: Path) -> dict[str, Any]:
 
 def limits(airframe: Path) -> Limits:
     """The limits of an airframe. Raises `AirframeError` when its files lack one."""
+    if is_recorded(airframe):
+        flown = {name: _recorded_limit(airframe, name) for name in Limits._fields if name != "stall"}
+        return Limits(**flown, stall=math.inf)
     published, loop = _numbers(airframe / "airframe.toml"), _numbers(airframe / "inner_loop.toml")
     return Limits(
         slowest=published("envelope", "V_min"),
@@ -137,6 +160,14 @@ def _numbers(file: Path) -> Callable[..., float]:
         return float(value)
 
     return number
+
+
+def _recorded_limit(file: Path, name: str) -> float:
+    table = _read(file).get("limits")
+    value = table.get(name) if isinstance(table, dict) else None
+    if isinstance(value, bool) or not isinstance(value, float | int) or not math.isfinite(value):
+        raise AirframeError(f"{file}: limits.{name} must be a number: the file is none of harness assess --fit")
+    return float(value)
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -7,8 +7,9 @@ docs/answers/blind_logs.md.
 
 import math
 import os
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,9 +25,9 @@ from harness.log import FlightLog
 from harness.loop import simulate
 from harness.plants.plant import Start
 from harness.pool import computed
-from harness.recorded import response_fit, turn
+from harness.recorded import fitted_plant, response_fit, turn
 from harness.recorded.assessment import CANNOT, LAG, Assessment, assess
-from harness.recorded.recorded_flight import Basis, Channel, RecordedFlight, sampled
+from harness.recorded.recorded_flight import Basis, Channel, LogError, RecordedFlight, sampled
 from harness.recorded.wind import Fit, track_of
 from harness.tables import markdown
 from harness.verdict.parts import PARTS
@@ -39,6 +40,7 @@ Array = NDArray[np.float64]
 PAGE = Path("docs/answers/blind_logs.md")
 LOGS = 200
 COVERED, WRONG = 0.90, 0.05  # what is asked: of the intervals, at least; of the claims, at most
+CIRCLE = 15.4  # s: the standoff distance of the paper's case over its airspeed
 KINDS = ("circles", "manoeuvres", "straight")
 SHARES = (0.4, 0.4, 0.2)
 TURN, SCALE, WIND, LAG_ROW = "turn relation", "airspeed scale", "wind", "lag"
@@ -227,6 +229,14 @@ class Told(NamedTuple):
     wrong: bool = False  # a word that the truth contradicts
 
 
+class Gains(NamedTuple):
+    """What became of the limit cycle of the paper's gains with those that follow from the log."""
+
+    refused: str = ""  # why no aircraft could be fitted
+    before: bool | None = None  # whether the aircraft that wrote the log is in a limit cycle; None: not to be told
+    after: bool | None = None
+
+
 class Answer(NamedTuple):
     """What `assess` made of one log."""
 
@@ -235,12 +245,37 @@ class Answer(NamedTuple):
     told: Mapping[str, Told]
     signs_right: bool
     reason: str  # why there is no turn relation; empty where there is one
+    gains: Gains
 
 
 def answered(seed: int) -> Answer:
     """One log, written and assessed."""
     blind = blind_log(seed)
-    return compared(seed, blind.hidden, assess(blind.recorded()))
+    found = assess(blind.recorded())
+    return compared(seed, blind.hidden, found)._replace(gains=gains_of(blind.flight, found))
+
+
+def gains_of(flight: Flight, found: Assessment) -> Gains:
+    """Flies the paper's gains, and those by rule for the fitted aircraft, on the one that wrote the log."""
+    speed = flight.start.airspeed
+    standoff = CIRCLE * speed
+    circle: dict[str, Any] = {"standoff": standoff, "max_heading_rate": math.radians(10.0)}
+    start = Start(position=(-0.5 * standoff, 0.3 * standoff), heading=0.5, airspeed=speed)
+    before = Flight(
+        plant="sixdof", law=harness.law("nftsm", "paper_1", **circle), aircraft=flight.aircraft, start=start,
+        duration=150.0,
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "my_flight.toml"
+        try:
+            file.write_text(fitted_plant.document(found), encoding="utf-8")
+        except LogError as error:
+            return Gains(refused=str(error))
+        recorded = replace(start, airspeed=aircraft.limits(file).design_airspeed)
+        fitted = replace(before, plant="lagged", aircraft=str(file), start=recorded)
+        law = harness.law("nftsm", "behind_inner_loop", flight=fitted, **circle)
+    told = [simulate(each).metrics["chatters"] for each in (before, replace(before, law=law))]
+    return Gains("", *(None if each is None else bool(each) for each in told))
 
 
 def compared(seed: int, hidden: Hidden, found: Assessment) -> Answer:
@@ -270,7 +305,8 @@ def compared(seed: int, hidden: Hidden, found: Assessment) -> Answer:
         or relation.word == CANNOT
         or (found.estimated.is_reversed is hidden.wind_reversed or math.hypot(*hidden.wind) < 1.0)
     ) and (relation.word == CANNOT or any("bank: the sign" in note for note in found.notes) is hidden.bank_reversed)
-    return Answer(seed, hidden.kind, told, signs_right=signs, reason=relation.reason if relation.word == CANNOT else "")
+    reason = relation.reason if relation.word == CANNOT else ""
+    return Answer(seed, hidden.kind, told, signs, reason, Gains())
 
 
 def _told(true: float, low: float, high: float) -> Told:
@@ -316,6 +352,24 @@ def page(answers: Sequence[Answer]) -> Iterator[str]:
     for reason in sorted(set(map(_without_numbers, reasons))):
         count = sum(_without_numbers(each) == reason for each in reasons)
         yield f"- {reason}: {count}"
+    yield ""
+    yield "## The gains that follow"
+    yield ""
+    yield "`harness assess --fit` writes the aircraft of the log; the gain set `behind_inner_loop` is computed for it."
+    yield "Flown on the 6-DOF aircraft that wrote the log, on the paper's circle in still air:"
+    yield ""
+    fitted = [answer.gains for answer in answers if not answer.gains.refused]
+    states: tuple[tuple[bool | None, str], ...] = ((True, "limit cycle"), (None, "not to be told"), (False, "none"))
+    counts = [
+        [word, str(sum(each.before is state for each in fitted)), str(sum(each.after is state for each in fitted))]
+        for state, word in states
+    ]
+    yield from markdown(["of the logs with a fit", "the paper's gains", "gains by the fit"], counts, "lrr")
+    yield ""
+    yield f"No aircraft was fitted to {len(answers) - len(fitted)} of {len(answers)} logs:"
+    yield ""
+    refusals = [_without_numbers(answer.gains.refused.partition(": ")[2]) for answer in answers if answer.gains.refused]
+    yield from (f"- {reason}: {refusals.count(reason)}" for reason in sorted(set(refusals)))
 
 
 def _without_numbers(reason: str) -> str:

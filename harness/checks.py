@@ -146,7 +146,7 @@ def airframe_of(name: str) -> Path:
             must = f"{name}: the folder must hold airframe.toml and a JSBSim model, {Path(name).name}.xml"
             raise ValueError(must) from None
         known = aircraft.names()
-        allowed = f"must be one of {', '.join(known)}, or a folder"
+        allowed = f"must be one of {', '.join(known)}, a folder, or a file of harness assess --fit"
         raise ValueError(f"is {shown(name)}, {allowed}{did_you_mean(name, known)}") from None
     aircraft.limits(airframe)
     if aircraft.is_stale(airframe):

@@ -49,7 +49,9 @@ class Flight:
 
     plant: Annotated[str, OneOf(tuple(PLANTS)), About("everything below the heading-rate command")]
     law: Law
-    aircraft: Annotated[str, About("an airframe by name, or its folder")] = "ultra_stick_25e"
+    aircraft: Annotated[str, About("an airframe by name, its folder, or a file of harness assess --fit")] = (
+        "ultra_stick_25e"
+    )
     duration: Annotated[Seconds, Gt(0), Le(1e6), About("length of the flight")] = 100.0
     guidance_period: Annotated[
         Seconds, Gt(0), Le(1e3), About("time between two commands of the law; a command is held until the next")

@@ -54,7 +54,8 @@ def _of_folder(airframe: str) -> dict[str, str]:
     """What a folder with an airframe is known by, wherever it lies; by its name alone where it is gone."""
     try:
         folder = aircraft.folder(airframe)
-        return {"name": folder.name, "data": content_hash(read(folder / "airframe.toml"))}
+        data = folder if aircraft.is_recorded(folder) else folder / "airframe.toml"
+        return {"name": folder.name, "data": content_hash(read(data))}
     except OSError:
         return {"name": Path(airframe).name}
 

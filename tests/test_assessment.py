@@ -2,24 +2,34 @@
 
 import json
 import math
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.blind_logs import SCALE, TURN, WIND, BlindLog, blind_log, compared
+import aircraft
+import harness
+from benchmarks.blind_logs import SCALE, TURN, WIND, BlindLog, Gains, blind_log, compared, gains_of
+from harness.flight import Flight
+from harness.key import flight_key
+from harness.plants.plant import Start
 from harness.recorded.assessment import CANNOT, LAG, LATERAL, Assessment, assess
-from harness.recorded.recorded_flight import Basis, LoggedEvent, RecordedFlight, sampled
+from harness.recorded.fitted_plant import document
+from harness.recorded.recorded_flight import Basis, LogError, LoggedEvent, RecordedFlight, sampled
 from harness.recorded.said import as_json, lines
 from harness.verdict.parts import PARTS
 from harness.vocabulary import Verdict
-from tests.builders import invoke
+from tests.builders import invoke, write
 
 LEVEL, AIRSPEED, SIDESLIP = (
     PARTS[column].title for column in ("altitude_deviation_peak_m", "airspeed_deviation", "sideslip_rms_deg")
 )
 RELATION = PARTS["turn_ratio"].title
+ON_BOARD = 5  # a log of circles, on board: a limit cycle that tells the response
 
 
 @lru_cache(maxsize=8)
@@ -29,6 +39,11 @@ def log(seed: int) -> BlindLog:
 
 def without(flight: RecordedFlight, *names: str) -> RecordedFlight:
     return replace(flight, channels={n: c for n, c in flight.channels.items() if n not in names})
+
+
+def every(flight: RecordedFlight, name: str, step: int) -> RecordedFlight:
+    channel = flight[name]
+    return flight.with_channel(name, replace(channel, time=channel.time[::step], values=channel.values[::step]))
 
 
 def words(found: Assessment) -> set[str]:
@@ -165,3 +180,74 @@ def test_a_log_too_short_to_judge_is_one_sentence_and_a_longer_one_a_table() -> 
     table = "\n".join(lines(found))
     assert all(name in table for name in ("turn relation", "no vane", "wind, by the track"))
     json.dumps(as_json(found), allow_nan=False)
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The aircraft of a log, as a file."""
+    file = tmp_path_factory.mktemp("fitted") / "my_flight.toml"
+    file.write_text(document(assess(log(ON_BOARD).recorded())), encoding="utf-8")
+    return file
+
+
+def test_the_aircraft_of_a_log_flies_and_is_predicted_on_the_plants_that_were_fitted(fitted: Path) -> None:
+    experiment = "experiments/stationary.toml"
+    of_it = ["--set", f"aircraft={fitted}"]
+    speed = ["--set", f"start.airspeed_mps={aircraft.limits(fitted).design_airspeed}"]
+    for plant in ("lagged", "coordinated"):
+        flown = invoke("fly", experiment, *of_it, *speed, "--set", f"plant={plant}")
+        assert flown.exit_code == 0, flown.output
+    assert "limit cycle:" in invoke("predict", experiment, *of_it, *speed, "--set", "plant=lagged").output
+    refused = invoke("fly", experiment, *of_it, *speed, "--set", "plant=sixdof")
+    assert refused.exit_code == 2
+    assert "it flies on lagged and coordinated" in refused.output
+    elsewhere = invoke("fly", experiment, *of_it, "--set", "plant=lagged", "--set", "start.airspeed_mps=40")
+    assert "was recorded at" in elsewhere.output
+
+
+def test_the_gains_that_follow_end_the_limit_cycle_of_the_aircraft_that_wrote_the_log() -> None:
+    flown = gains_of(log(ON_BOARD).flight, assess(log(ON_BOARD).recorded()))
+    assert flown == Gains("", before=True, after=False)
+
+
+def test_the_flight_of_a_fitted_aircraft_is_known_by_the_files_content_and_flown_again_from_the_store(
+    fitted: Path, tmp_path: Path
+) -> None:
+    file = shutil.copy(fitted, tmp_path / "of_the_log.toml")
+    speed = aircraft.limits(fitted).design_airspeed
+    flight = Flight(
+        plant="lagged",
+        law=harness.law("nftsm", "fitted"),
+        aircraft=str(file),
+        duration=5.0,
+        start=Start(airspeed=speed),
+    )
+    key = flight_key(flight)
+    assert flight_key(replace(flight, aircraft=str(fitted))) != key  # another name
+    experiment = write(
+        tmp_path / "one.toml",
+        f'title = "one"\n[flight]\nplant = "lagged"\naircraft = "of_the_log.toml"\nduration_s = 5.0\n'
+        f'[flight.law]\nname = "nftsm"\ngains = "fitted"\n[flight.start]\nairspeed_mps = {speed}\n',
+    )
+    assert invoke("run", experiment, "--out", tmp_path / "run").exit_code == 0
+    Path(file).write_text(
+        fitted.read_text().replace("damping", "damping ", 1).replace("bank_limit = ", "bank_limit = 0")
+    )
+    again = invoke("fly", f"{tmp_path / 'run'}:{key[:8]}")
+    assert again.exit_code == 0, again.output
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda flight: flight.changed(np.zeros_like, "bank_command"), "not excited"),
+        (lambda flight: without(flight, "bank_command"), "no bank command"),
+        (lambda flight: without(flight, "airspeed"), "no measured airspeed"),
+        (lambda flight: every(flight, "bank", 8), "too few samples"),
+    ],
+)
+def test_no_aircraft_is_fitted_to_a_log_that_does_not_tell_it(
+    change: Callable[[RecordedFlight], RecordedFlight], reason: str
+) -> None:
+    with pytest.raises(LogError, match=reason):
+        document(assess(change(log(ON_BOARD).recorded())))

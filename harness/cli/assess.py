@@ -15,8 +15,13 @@ from harness.cli._paths import PATH
 @click.option("--map", "map_name", metavar="FILE.toml|NAME", help="Which column of a CSV is what; see the guide.")
 @click.option("--from", "begin", type=float, default=-math.inf, help="Leave out what comes before, s.")
 @click.option("--to", "end", type=float, default=math.inf, help="Leave out what comes after, s.")
+@click.option(
+    "--fit", type=PATH, metavar="FILE.toml", help="Write the aircraft of this flight: lagged and coordinated."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
-def assess(logs: tuple[Path, ...], map_name: str | None, begin: float, end: float, as_json: bool) -> None:
+def assess(
+    logs: tuple[Path, ...], map_name: str | None, begin: float, end: float, fit: Path | None, as_json: bool
+) -> None:
     """Judge the assumption on the log of a real flight.
 
     LOG is a ULog file (PX4), a DataFlash file (ArduPilot), or CSV files of one flight; a folder stands for the logs in
@@ -25,15 +30,22 @@ def assess(logs: tuple[Path, ...], map_name: str | None, begin: float, end: floa
     of the assumption, in the words and within the margins of harness compare, with an interval over independent windows
     of flight; and what it cannot say, with the reason. The time is in seconds since the log's first row.
 
+    With --fit the response of the bank to its command is written to a file, which stands for an aircraft in settings
+    (aircraft = "FILE.toml"): fly and predict take it on the plants lagged and coordinated. A log that does not tell the
+    response is refused.
+
     \b
     Examples:
       harness assess flight.ulg --from 60 --to 300
       harness assess alfa/ --map alfa --json
+      harness assess flight.bin --fit my_flight.toml
     """
     import json
 
     from harness.cli._input import BadInput
-    from harness.recorded import contents, said
+    from harness.cli._paths import writable
+    from harness.files import write_text
+    from harness.recorded import contents, fitted_plant, said
     from harness.recorded.assessment import assess as assessed
     from harness.recorded.read import read_log
 
@@ -44,8 +56,13 @@ def assess(logs: tuple[Path, ...], map_name: str | None, begin: float, end: floa
     if not flight.channels:
         raise BadInput(f"--from {begin:g} --to {end:g}: the log goes from {whole.begin:.2f} to {whole.end:.2f} s")
     found = assessed(whole, begin, end)
+    if fit:
+        writable(fit)
+        write_text(fit, fitted_plant.document(found))
     if as_json:
         click.echo(json.dumps({**contents.as_json(flight), "assessment": said.as_json(found)}, indent=2))
         return
     for line in (*contents.contents(flight), "", *said.lines(found)):
         click.echo(line)
+    if fit:
+        click.echo(f"\naircraft = {json.dumps(str(fit))}: for the plants lagged and coordinated")

@@ -27,7 +27,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> No
       harness identify my_airframe --keep
     """
     from aircraft import identified as file_of
-    from aircraft import limits
+    from aircraft import is_recorded, limits
     from harness.checks import airframe_of
     from harness.cli._input import BadInput
     from harness.cli._paths import writable, writable_folder
@@ -43,6 +43,8 @@ def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> No
         airframe = airframe_of(aircraft)
     except ValueError as error:
         raise BadInput(f"AIRCRAFT: {error}") from None
+    if is_recorded(airframe):
+        raise BadInput(f"AIRCRAFT: {airframe.name} is what was fitted to a recorded flight: there is no model to fly")
     speed = limits(airframe).design_airspeed if airspeed is None else airspeed
     writable_folder(out)
     files = [writable(out / f"{airframe.name}_identified.toml"), *([writable(file_of(airframe))] if keep else [])]

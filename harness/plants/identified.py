@@ -71,6 +71,8 @@ def identified(airframe: Path, airspeed: float) -> Identified:
     near = min(known, key=lambda entry: abs(entry.airspeed - airspeed), default=None)
     if near is None or abs(near.airspeed - airspeed) > _NEAR * near.airspeed:
         speeds = ", ".join(f"{entry.airspeed:g}" for entry in known)
+        if aircraft.is_recorded(airframe):
+            raise IdentifiedError(f"{airframe.name} was recorded at {speeds} m/s, the flight is at {airspeed:g} m/s")
         at = f"identified at {speeds} m/s" if known else "not identified"
         raise IdentifiedError(
             f"{airframe.name} is {at}, the flight is at {airspeed:g} m/s: "
@@ -89,11 +91,15 @@ def read(airframe: Path) -> list[Identified]:
         return sorted((_from(table) for table in tables), key=lambda entry: entry.airspeed)
     except (AttributeError, LookupError, TypeError, ValueError, ArithmeticError) as error:
         again = f"run harness identify {aircraft.argument(airframe)} --keep"
+        if aircraft.is_recorded(airframe):
+            again = "write it anew with harness assess --fit"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
 
 
 def is_stale(airframe: Path) -> bool:
     """Whether the airframe's model or its inner loop has changed since it was identified. OSError without the file."""
+    if aircraft.is_recorded(airframe):
+        return False
     text = aircraft.identified(airframe).read_text(encoding="utf-8")
     return tables_of(text).get("model") != model_digest(airframe)
 
@@ -114,27 +120,31 @@ def document(airframe: Path, known: list[Identified]) -> str:
         f'model = "{model_digest(airframe)}" # of the model and inner loop that were flown',
     ]
     for entry in sorted(known, key=lambda entry: entry.airspeed):
-        lines += ["", "[[at]]", f"airspeed = {entry.airspeed:g}", f"bank_limit = {entry.bank_limit:g}"]
-        for title, values, about in (
-            ("heading_rate", asdict(entry.heading_rate), "from its command, the rate trim on: lagged"),
-            ("bank", asdict(entry.bank), "from its command, the rate trim off: coordinated"),
-            ("hold", asdict(entry.hold), "what the load factor beyond one does to the airspeed: coordinated"),
-            ("measured", entry.measured, "flown on sixdof"),
-        ):
-            lines += [f"[at.{title}] # {about}", *(f"{name} = {value:.5g}" for name, value in values.items())]
-        lines.append(
-            "[at.errors] # of the heading rate, RMS over the command's, [lagged, coordinated]; not used in the fit"
-        )
-        lines += [f'"{name}" = [{a:.4f}, {b:.4f}]' for name, (a, b) in entry.errors.items()]
-        if entry.sweep:
-            lines.append(
-                "[at.sweep] # of small commands, flown on sixdof: heading rate over its command, rad/s, 1, rad"
-            )
-            lines += [
-                f"{name} = [{', '.join(f'{v:.5g}' for v in values)}]"
-                for name, values in zip(Sweep._fields, entry.sweep, strict=True)
-            ]
+        lines += ["", *table_of(entry)]
     return "\n".join(lines) + "\n"
+
+
+def table_of(entry: Identified, source: str = "flown on sixdof") -> list[str]:
+    """The lines of one identification in a file; `source` is where the measured numbers are from."""
+    lines = ["[[at]]", f"airspeed = {entry.airspeed:g}", f"bank_limit = {entry.bank_limit:g}"]
+    for title, values, about in (
+        ("heading_rate", asdict(entry.heading_rate), "from its command, the rate trim on: lagged"),
+        ("bank", asdict(entry.bank), "from its command, the rate trim off: coordinated"),
+        ("hold", asdict(entry.hold), "what the load factor beyond one does to the airspeed: coordinated"),
+        ("measured", entry.measured, source),
+    ):
+        lines += [f"[at.{title}] # {about}", *(f"{name} = {value:.5g}" for name, value in values.items())]
+    lines.append(
+        "[at.errors] # of the heading rate, RMS over the command's, [lagged, coordinated]; not used in the fit"
+    )
+    lines += [f'"{name}" = [{a:.4f}, {b:.4f}]' for name, (a, b) in entry.errors.items()]
+    if entry.sweep:
+        lines.append("[at.sweep] # of small commands, flown on sixdof: heading rate over its command, rad/s, 1, rad")
+        lines += [
+            f"{name} = [{', '.join(f'{v:.5g}' for v in values)}]"
+            for name, values in zip(Sweep._fields, entry.sweep, strict=True)
+        ]
+    return lines
 
 
 def _from(table: Mapping[str, Any]) -> Identified:

@@ -13,7 +13,7 @@ import aircraft
 import autopilot
 from harness.flight_errors import Errors
 from harness.plants.kinematic import Kinematic
-from harness.plants.plant import Plant
+from harness.plants.plant import Plant, PlantError
 
 _FOLDER = Path(__file__).parent
 
@@ -82,6 +82,9 @@ def _coordinated(setup: Setup) -> Plant:
 
 
 def _sixdof(setup: Setup) -> Plant:
+    if aircraft.is_recorded(setup.airframe):
+        fitted = f"{setup.airframe.name} is what was fitted to a recorded flight: it flies on lagged and coordinated"
+        raise PlantError("plant", fitted)
     from harness.plants.sixdof import SixDof  # late: only this plant needs JSBSim
 
     return SixDof(setup.airframe, setup.step, setup.rate_trim, setup.errors)
@@ -95,12 +98,16 @@ def _airframe_files(airframe: Path) -> dict[str, Path]:
 def identification_files(airframe: Path) -> dict[str, Path]:
     """The file with what is identified of an airframe, by a name for its purpose; none where it is not identified."""
     identification = aircraft.identified(airframe)
-    return {f"aircraft/{identification.name}": identification} if identification.is_file() else {}
+    return {_identified_name(airframe): identification} if identification.is_file() else {}
 
 
 def _identified_files(airframe: Path) -> Mapping[str, Path]:
-    identification = aircraft.identified(airframe)
-    return {**_airframe_files(airframe), f"aircraft/{identification.name}": identification}
+    identification = {_identified_name(airframe): aircraft.identified(airframe)}
+    return identification if aircraft.is_recorded(airframe) else {**_airframe_files(airframe), **identification}
+
+
+def _identified_name(airframe: Path) -> str:
+    return f"aircraft/{aircraft.RECORDED if aircraft.is_recorded(airframe) else aircraft.identified(airframe).name}"
 
 
 def _sixdof_files(airframe: Path) -> Mapping[str, Path]:

@@ -374,7 +374,7 @@ def _airspeed(flight: RecordedFlight) -> _Made:
     channel = flight["airspeed"]
     usual = float(np.median(channel.values))
     # a command of another scale than the measurement is no deviation
-    time, values = _averaged(channel, 1.0)
+    time, values = averaged(channel, 1.0)
     return _Made(_windowed(time, np.abs(values / usual - 1.0), _rms), "from the flight's median")
 
 
@@ -391,7 +391,7 @@ def _lateral(flight: RecordedFlight) -> _Made:
     """The slope of the lateral specific force on g sin(bank): the turn relation less one, from another sensor."""
     if not flight.has("lateral_acceleration", "bank"):
         raise Refusal("the log has no lateral specific force" if "bank" in flight else "the log has no bank")
-    time, force = _averaged(flight["lateral_acceleration"], 1.0)
+    time, force = averaged(flight["lateral_acceleration"], 1.0)
     bank = flight["bank"].at(time)
     known = np.isfinite(bank) & np.isfinite(force) & (np.abs(bank) <= turn.STEEPEST)
     time, force, lean = time[known], force[known], GRAVITY * np.sin(bank[known])
@@ -518,7 +518,7 @@ def _windowed(time: Array, values: Array, of: Callable[[Array], float]) -> Sampl
         length *= 2.0
 
 
-def _averaged(channel: Channel, over: float) -> tuple[Array, Array]:
+def averaged(channel: Channel, over: float) -> tuple[Array, Array]:
     """Means over so many seconds each, with their middles: noise of single values is no deviation."""
     if channel.interval >= over:
         return channel.time, channel.values

@@ -176,14 +176,23 @@ def _airframe(folder: Path, name: str, then: Mapping[str, str]) -> str:
         if not kept:
             return aircraft.names()[0]  # the flight had no airframe: any will do
     else:
-        paths = {n: aircraft.model(now) if n == "model" else now / n for n in kept}
+        paths = {n: _file_of(now, n) for n in kept}
         if all(_hash(path) == kept[n] for n, path in paths.items()):
             return name
     base = _last_name(folder, "aircraft", name)
     unpacked = _unpacked(folder, {f"{base}.xml" if n == "model" else n: d for n, d in kept.items()}, base)
+    if aircraft.RECORDED in kept:
+        return str(unpacked / aircraft.RECORDED)
     with suppress(aircraft.AirframeError):  # its files say what is wrong with them when they are read
         aircraft.keep_written(unpacked)
     return str(unpacked)
+
+
+def _file_of(airframe: Path, name: str) -> Path:
+    """The file of an airframe that a store knows by this name."""
+    if name == aircraft.RECORDED:
+        return airframe
+    return aircraft.model(airframe) if name == "model" else airframe / name
 
 
 def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Path:

@@ -285,12 +285,16 @@ def _with_paths(flight: Mapping[str, object], folder: Path) -> Mapping[str, obje
 
 
 def _absolute(key: Key, value: object, folder: Path = Path()) -> object:
-    """The value of a key; a file of a track or a law, or a folder of an airframe, as a path from `folder`."""
+    """The value of a key; a file of a track, a law or a recorded flight, or an airframe's folder, as a path."""
     if not isinstance(value, str) or not value:
         return value
     if key == ("flight", "law", "name"):
         return absolute(file_name(value), folder)
     path = str(folder.absolute() / file_name(value))
-    if key == ("flight", "aircraft") and value not in aircraft.names() and aircraft.is_folder(path):
+    if (
+        key == ("flight", "aircraft")
+        and value not in aircraft.names()
+        and (aircraft.is_folder(path) or aircraft.is_recorded(path))
+    ):
         return path
     return path if key == ("flight", "target", "track") else value

@@ -1,0 +1,90 @@
+"""The aircraft of a recorded flight, for the plants `lagged` and `coordinated`: a file that stands for an airframe."""
+
+import math
+from types import MappingProxyType
+
+import numpy as np
+
+from harness.plants.coordinated import AirspeedHold
+from harness.plants.identified import Identified, table_of
+from harness.recorded.assessment import LAG, SAMPLES_IN_LAG, Assessment, averaged
+from harness.recorded.recorded_flight import Array, Basis, LogError
+from harness.recorded.response_fit import GAIN
+
+SUREST = 0.4  # half of the lag's interval over the lag: a log that says less does not tell the response
+HELD = AirspeedHold(gain=0.0, frequency=1.0, damping=1.0)  # constant airspeed: its change is not fitted
+# Where autopilots keep the largest bank that they command: the parameter, and its unit, rad.
+BANK_LIMITS = {
+    "ROLL_LIMIT_DEG": math.radians(1.0),
+    "LIM_ROLL_CD": math.radians(0.01),
+    "FW_R_LIM": math.radians(1.0),
+}
+
+
+def identified(found: Assessment) -> Identified:
+    """What the plants fly by. Raises `LogError` with the reason where the log does not tell."""
+    fit = found.response
+    if fit is None:
+        raise LogError(f"no aircraft can be fitted to this log: {found[LAG.title].reason}")
+    if fit.interval * SAMPLES_IN_LAG > fit.lag:
+        raise LogError(
+            f"no aircraft can be fitted to this log: too few samples for the dynamics: the bank has "
+            f"{1.0 / fit.interval:.2g} new values a second, {SAMPLES_IN_LAG / fit.lag:.2g} are needed for a lag of "
+            f"{fit.lag:.2g} s"
+        )
+    low, high = fit.lag_interval()
+    if not (fit.lag > 0.0 and 0.5 * (high - low) <= SUREST * fit.lag):
+        raise LogError(
+            f"no aircraft can be fitted to this log: not excited enough: the lag is {fit.lag:.2g} s, anything from "
+            f"{low:.2g} to {high:.2g} s fits"
+        )
+    gain = fit.sample(GAIN).interval() or (math.nan, math.nan)
+    return Identified(
+        airspeed=float(f"{np.median(_airspeeds(found)):.3g}"),
+        heading_rate=fit.response,
+        bank=fit.response,
+        hold=HELD,
+        bank_limit=_bank_limit(found),
+        measured=MappingProxyType(
+            {"gain": fit.gain, "gain_low": gain[0], "gain_high": gain[1], "lag_s": fit.lag, "lag_low_s": low,
+             "lag_high_s": high, "explained": fit.explained}
+        ),
+        errors=MappingProxyType({}),
+    )  # fmt: skip
+
+
+def document(found: Assessment) -> str:
+    """The text of the file. Raises `LogError`."""
+    one, speeds = identified(found), _airspeeds(found)
+    of_receipt = ["# The lag holds the age of the telemetry: the aircraft is quicker than this."]
+    lines = [
+        f"# Written by `harness assess --fit` from {found.flight.name}, {found.begin:.1f} to {found.end:.1f} s:",
+        "# what the plants lagged and coordinated fly by. SI, rad.",
+        *(of_receipt if found.flight.of_receipt else []),
+        "",
+        "[limits] # as flown",
+        f"slowest = {min(speeds.min(), one.airspeed):.3g}",
+        f"design_airspeed = {one.airspeed:g}",
+        f"fastest = {max(speeds.max(), one.airspeed):.3g}",
+        f"bank = {one.bank_limit:.4g}",
+        "",
+        *table_of(one, "in the recorded flight, with the ends of 95 % intervals"),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _airspeeds(found: Assessment) -> Array:
+    """True airspeeds, m/s, as means over a second."""
+    flight = found.flight
+    if not flight.has("airspeed") or flight["airspeed"].basis is not Basis.MEASURED:
+        raise LogError("no aircraft can be fitted to this log: it has no measured airspeed")
+    scale = found.wind.scale[0] if found.wind and found.wind.scale else 1.0
+    return scale * averaged(flight["airspeed"], 1.0)[1]
+
+
+def _bank_limit(found: Assessment) -> float:
+    """The largest bank that the autopilot commands: by its parameters, else the largest that it commanded."""
+    for name, unit in BANK_LIMITS.items():
+        if (value := found.flight.parameters.get(name, 0.0)) > 0.0:
+            return value * unit
+    return float(np.abs(found.flight["bank_command"].values).max())
