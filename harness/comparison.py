@@ -33,7 +33,7 @@ def compare(
     - `by`: the setting, a column of the results; single gains change with a law or its set, nothing else does. None is
       the plant where several were flown, else the law or the first setting that varies; of several directories it is
       "directory": the same settings flown by other code or libraries, or with other settings throughout.
-    - `baseline`: its value that the others are compared with; None is the kinematic plant, or the first value.
+    - `baseline`: its value that the others are compared with; None is the lowest plant, or the first value.
     - `where`: only flights with these settings, as in `{"wind.turbulence": "none"}`; a list holds several values.
     - `assess`: the margins of the verdict; None: those that the run's settings say, of a DataFrame the defaults.
 

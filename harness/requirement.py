@@ -10,7 +10,7 @@ from types import MappingProxyType
 from harness.error import HarnessError, did_you_mean
 from harness.feasibility import feasibility_margin
 from harness.flight import Flight
-from harness.limit_cycle.predicted import MARGIN, PREDICTED, predicted, predicted_margin
+from harness.limit_cycle.predicted import PREDICTED, predicted
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.plant import Outcome
 
@@ -108,10 +108,8 @@ def known_name(name: str) -> str:
 def foreseen(flight: Flight, names: Collection[str] = FORESEEN) -> dict[str, Fact]:
     """What is known of a flight without flying it; at least those of `FORESEEN` that are named."""
     facts: dict[str, Fact] = {FEASIBILITY: math.degrees(feasibility_margin(flight))}
-    if not set(names).isdisjoint({*PREDICTED} - {MARGIN}):
-        facts.update(predicted(flight))
-    elif MARGIN in names:
-        facts[MARGIN] = predicted_margin(flight)
+    if named := [name for name in PREDICTED if name in names]:
+        facts.update(predicted(flight, named))
     return facts
 
 

@@ -97,6 +97,16 @@ def test_json_holds_pairs_differences_scorecards_and_the_margins_of_the_run(flow
     assert part(answer, "altitude_deviation_peak_m")["verdict"] == "holds"
 
 
+def test_without_the_kinematic_plant_the_lowest_is_the_baseline(tmp_path: Path) -> None:
+    path, out = tmp_path / "two.toml", tmp_path / "out"
+    path.write_text(
+        '[flight]\nduration_s = 20.0\n[flight.law]\nname = "nftsm"\n[matrix]\nplant = ["sixdof", "lagged"]\n'
+    )
+    assert invoke("run", path, "--out", out).exit_code == 0
+    assert compared(out)["baseline"] == "lagged"
+    assert invoke("report", out, "--out", tmp_path / "page.html").exit_code == 0
+
+
 def test_a_margin_on_the_command_line_changes_the_verdict(flown: Path) -> None:
     assert part(compared(flown), "bank_reserve_deg")["verdict"] == "holds"
     assert part(compared(flown, "--set", "assess.bank_reserve_deg=60"), "bank_reserve_deg")["verdict"] == "fails"

@@ -78,18 +78,19 @@ def _map(folder: Path, metric: str, where: tuple[str, ...]) -> tuple[Picture, st
     from harness.cli._input import BadInput
     from harness.comparison import chosen
     from harness.drawing import COLUMN, PAGE, picture
+    from harness.limit_cycle.predicted import MARGIN
     from harness.runs.comparable import comparable
     from harness.runs.store import StoreError
     from harness.settings import SettingsError
     from harness.verdict import figures, grid
-    from harness.verdict.following import with_margins
+    from harness.verdict.following import with_predicted
     from harness.verdict.pairs import CompareError, axes, entered, spread
 
     if not folder.is_dir():
         raise BadInput(f"{folder}: must be a folder that `harness run` wrote")
     try:
         flights, assess, *_ = comparable([folder])
-        table = entered(with_margins(chosen(flights, wanted(where))), assess.circling_error)
+        table = entered(with_predicted(chosen(flights, wanted(where)), [MARGIN]), assess.circling_error)
         varies = axes(spread(table))
         grids = grid.maps(table, varies, metric)
     except (StoreError, SettingsError, CompareError) as error:

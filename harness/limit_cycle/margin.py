@@ -54,28 +54,29 @@ class Following:
         return None if self.margin is None else self.margin >= ENOUGH
 
 
-def following(flight: Flight) -> Following:
-    """What is predicted of the flight's law behind its airframe's inner loop, whatever plant the flight names."""
-    return following_of(flight.law, aircraft.folder(flight.aircraft), flight.start.airspeed, flight.guidance_period)
+def following(flight: Flight, *, cycle: bool = True) -> Following:
+    """What is predicted of the flight's law behind its airframe's inner loop, whatever plant the flight names.
 
-
-def following_of(law: Law, airframe: Path, airspeed: float, period: float) -> Following:
-    """The same of a law (a frozen value) at an airspeed, m/s, with its commands held for `period`, s.
-
-    Kept for the next call: it takes up to a second.
+    Kept for the next call: it takes up to a second; without the search for the `cycle` a quarter of that.
     """
+    start, folder = flight.start, aircraft.folder(flight.aircraft)
+    return following_of(flight.law, folder, start.airspeed, flight.guidance_period, cycle=cycle)
+
+
+def following_of(law: Law, airframe: Path, airspeed: float, period: float, *, cycle: bool = True) -> Following:
+    """The same of a law (a frozen value) at an airspeed, m/s, with its commands held for `period`, s."""
     try:
         found = identified(airframe, airspeed)
     except IdentifiedError as error:
         return Following(reason=str(error))
     try:
-        return _following(Loop(law, found.heading_rate, airspeed, period), found.sweep)
+        return _following(Loop(law, found.heading_rate, airspeed, period), found.sweep, cycle)
     except LawFailed as error:
         return Following(reason=str(error))
 
 
 @lru_cache(maxsize=4096)
-def _following(loop: Loop, sweep: Sweep | None) -> Following:
+def _following(loop: Loop, sweep: Sweep | None, with_cycle: bool) -> Following:
     if reason := _why_unknown(loop):
         return Following(reason=reason)
     crossing, margin, cycle = _judged(loop)
@@ -88,21 +89,13 @@ def _following(loop: Loop, sweep: Sweep | None) -> Following:
         crossover_delay=_known(-phase / crossing.frequency) if crossing else None,
         phase_margin=crossing.phase_margin if crossing else None,
         margin=_known(margin),
-        cycle=cycle() if margin <= _CALM else None,
+        cycle=cycle() if with_cycle and margin <= _CALM else None,
     )
 
 
 def margin_of(flight: Flight) -> float | None:
-    """The margin of `following` alone, in a third of the time; None when unknown."""
-    try:
-        found = identified(aircraft.folder(flight.aircraft), flight.start.airspeed)
-    except IdentifiedError:
-        return None
-    loop = Loop(flight.law, found.heading_rate, flight.start.airspeed, flight.guidance_period)
-    try:
-        return None if _why_unknown(loop) else _known(_judged(loop)[1])
-    except LawFailed:
-        return None
+    """The margin alone; None when unknown."""
+    return following(flight, cycle=False).margin
 
 
 @lru_cache(maxsize=4096)

@@ -24,7 +24,7 @@ from harness.verdict.answer import interval, plain, signed, unit_of
 from harness.verdict.comparison import Comparison, Scorecard, compare_flights
 from harness.verdict.conditions import conclude
 from harness.verdict.effects import Disturbed, disturbances
-from harness.verdict.following import with_following
+from harness.verdict.following import with_predicted
 from harness.verdict.judgement import Judgement
 from harness.verdict.pairs import entered
 from harness.verdict.parts import PARTS, Group, with_shares
@@ -375,7 +375,7 @@ def rows_kept(flights: "pd.DataFrame") -> "pd.DataFrame":
     kept = flights[flights["plant"].isin(PLANTS)].drop(columns=["run", "version", "seconds"], errors="ignore")
     constant = [c for c in kept.columns if c.startswith(("estimator.", "target.", "wind.", "inner_loop.", "metrics."))]
     needed = ("wind.steady_mps", "wind.turbulence", "estimator.kind")
-    return with_following(kept.drop(columns=[c for c in constant if c not in needed])).reset_index(drop=True)
+    return with_predicted(kept.drop(columns=[c for c in constant if c not in needed])).reset_index(drop=True)
 
 
 def _folder() -> click.Path:

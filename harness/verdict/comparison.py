@@ -7,12 +7,13 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from harness.limit_cycle.predicted import MARGIN
 from harness.log.metric import METRICS
 from harness.margins import Assess
 from harness.plants.ladder import BASELINE
 from harness.settings.laws import short_names
 from harness.verdict.conditions import Conclusion, conclude
-from harness.verdict.following import with_following, with_margins
+from harness.verdict.following import with_predicted
 from harness.verdict.judgement import Judgement, frame, judged
 from harness.verdict.pairs import (
     FAILED,
@@ -30,7 +31,7 @@ from harness.verdict.parts import PARTS, Part, with_shares
 from harness.verdict.statistics import Share, share
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Scorecard:
     """One airframe under one value of what is compared: the family in which errors are kept."""
 
@@ -53,8 +54,14 @@ class Scorecard:
         return [part for part in PARTS.values() if part.column in known]
 
     def conclusion(self, column: str) -> Conclusion:
-        """What all its cells say of a part."""
-        return conclude(self.of(column), self.axes)
+        """What all its cells say of a part; kept, since of many cells it takes seconds."""
+        if column not in self._concluded:
+            self._concluded[column] = conclude(self.of(column), self.axes)
+        return self._concluded[column]
+
+    @cached_property
+    def _concluded(self) -> dict[str, Conclusion]:
+        return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,10 +176,10 @@ def compare_flights(
     Raises `CompareError` with what is missing.
     """
     if baseline is None:
-        values = ordered(flights[by])
-        baseline = BASELINE if by == "plant" else values[0]
+        baseline = ordered(flights[by])[0]
     assumption = by == "plant" and shown(baseline) == BASELINE
-    table = with_shares(entered((with_following if assumption else with_margins)(flights), assess.circling_error))
+    predicted = (*(("heading_rate_gain_slow",) if assumption else ()), MARGIN)
+    table = with_shares(entered(with_predicted(flights, predicted), assess.circling_error))
     laws = short_names(table["law.name"])
     table["law.name"] = table["law.name"].map(laws)
     baseline = laws.get(str(baseline), baseline) if by == "law.name" else baseline

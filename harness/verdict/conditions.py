@@ -67,23 +67,36 @@ def conclude(cells: Sequence[Judgement], across: Mapping[str, Sequence[object]])
 
 def _best(cells: Sequence[Judgement], across: Mapping[str, Sequence[object]], word: Verdict) -> Condition | None:
     """The condition that covers most cells with the word; of equals the one of fewer axes, then of more values."""
-    proved = [c for values in _candidates(cells, across) if (c := _proved(cells, values, across, word))]
+    agree, have = _bits([_agrees(cell, word) for cell in cells]), _bits([cell.word == word for cell in cells])
+    opposites = _opposites(cells, across, word)
+    proved = [
+        Condition(word, values, _and(values, across), (inside & have).bit_count(), inside.bit_count())
+        for values, inside in _candidates(cells, across)
+        if not inside & ~agree and inside & have and all(_matters(values, axis, inside, opposites) for axis in values)
+    ]
     return max(proved, key=lambda c: (c.cells, -len(c.values), sum(map(len, c.values.values()))), default=None)
 
 
-def _candidates(cells: Sequence[Judgement], across: Mapping[str, Sequence[object]]) -> Iterator[Mapping[str, Values]]:
-    """Stretches of the flown values of one axis, and of two."""
+def _candidates(
+    cells: Sequence[Judgement], across: Mapping[str, Sequence[object]]
+) -> Iterator[tuple[Mapping[str, Values], int]]:
+    """Stretches of the flown values of one axis, and of two, each with a bit for every cell within."""
     stretches = {}
     for axis, values in across.items():
         flown = [value for value in values if any(cell.at[axis] == value for cell in cells)]
         if len(flown) > 1:
-            stretches[axis] = list(_stretches(flown))
+            stretches[axis] = [(some, _bits([cell.at[axis] in some for cell in cells])) for some in _stretches(flown)]
     for axis, some in stretches.items():
-        for stretch in some:
-            yield {axis: stretch}
+        for values, inside in some:
+            yield {axis: values}, inside
     for (first, some), (second, others) in combinations(stretches.items(), 2):
-        for values, more in product(some, others):
-            yield {first: values, second: more}
+        for (values, inside), (more, there) in product(some, others):
+            yield {first: values, second: more}, inside & there
+
+
+def _bits(these: Sequence[bool]) -> int:
+    """A number with a bit for each that is true."""
+    return sum(1 << place for place, is_so in enumerate(these) if is_so)
 
 
 def _stretches(values: Sequence[object]) -> Iterator[Values]:
@@ -98,20 +111,27 @@ def _stretches(values: Sequence[object]) -> Iterator[Values]:
             yield from combinations(values, size)
 
 
-def _proved(
-    cells: Sequence[Judgement], values: Mapping[str, Values], across: Mapping[str, Sequence[object]], word: Verdict
-) -> Condition | None:
+Opposites = Mapping[str, Sequence[tuple[int, Values]]]
+
+
+def _opposites(cells: Sequence[Judgement], across: Mapping[str, Sequence[object]], word: Verdict) -> Opposites:
+    """For each axis the cells with the word, by their bit, and where on the axis matched cells have the opposite."""
     opposite = Verdict.FAILS if word == Verdict.HOLDS else Verdict.HOLDS
-    inside = [cell for cell in cells if all(cell.at[axis] in some for axis, some in values.items())]
-    having = [cell for cell in inside if cell.word == word]
-    if not having or not all(_agrees(cell, word) for cell in inside):
-        return None
-    outside = [cell for cell in cells if cell.word == opposite]
-    for axis, some in values.items():
-        if not any(_matched(a, b, axis) and b.at[axis] not in some for a in having for b in outside):
-            return None
-    text = " and ".join(_text(axis, some, across[axis]) for axis, some in values.items())
-    return Condition(word, values, text, len(having), len(inside))
+    others = [cell for cell in cells if cell.word == opposite]
+    having = [(1 << place, cell) for place, cell in enumerate(cells) if cell.word == word]
+    found = {
+        axis: [(bit, tuple(b.at[axis] for b in others if _matched(a, b, axis))) for bit, a in having] for axis in across
+    }
+    return {axis: [pair for pair in pairs if pair[1]] for axis, pairs in found.items()}
+
+
+def _matters(values: Mapping[str, Values], axis: str, inside: int, opposites: Opposites) -> bool:
+    """Whether a cell inside with the word has a matched one of the opposite word, outside on this axis."""
+    return any(inside & bit and any(at not in values[axis] for at in there) for bit, there in opposites[axis])
+
+
+def _and(values: Mapping[str, Values], across: Mapping[str, Sequence[object]]) -> str:
+    return " and ".join(_text(axis, some, across[axis]) for axis, some in values.items())
 
 
 def _agrees(cell: Judgement, word: Verdict) -> bool:

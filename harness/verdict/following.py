@@ -5,7 +5,7 @@ airframe, for an airframe that is not identified at the flight's airspeed, and f
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import pandas as pd
 
 from harness.error import HarnessError
 from harness.flight import Flight
-from harness.limit_cycle.predicted import MARGIN, PREDICTED, predicted, predicted_margin
+from harness.limit_cycle.predicted import PREDICTED, predicted
 from harness.plants.ladder import PLANTS
 from harness.settings import flight_from_document
 from harness.settings.columns import is_setting, nested
@@ -22,33 +22,25 @@ from harness.verdict.pairs import joined
 _ALSO = ("law.", "errors.")  # settings that a prediction depends on, or that forbid one
 
 
-def with_following(flights: pd.DataFrame) -> pd.DataFrame:
-    """The flights with `PREDICTED`; flights of equal law, airframe, airspeed, period and errors are predicted once."""
-    return _with(flights, PREDICTED, lambda flight: list(predicted(flight).values()))
+def with_predicted(flights: pd.DataFrame, names: Collection[str] = tuple(PREDICTED)) -> pd.DataFrame:
+    """The flights with these columns of `PREDICTED`; those of the limit cycle itself take three quarters of the time.
 
-
-def with_margins(flights: pd.DataFrame) -> pd.DataFrame:
-    """The same with the margin to the limit cycle alone, in a third of the time."""
-    return _with(flights, [MARGIN], lambda flight: [predicted_margin(flight)])
-
-
-def _with(
-    flights: pd.DataFrame, columns: Collection[str], numbers: Callable[[Flight], Sequence[float | None]]
-) -> pd.DataFrame:
+    Flights of equal law, airframe, airspeed, period and errors are predicted once.
+    """
     keys = ["aircraft", "start.airspeed_mps", "guidance_period_s"]
     keys += [column for column in flights.columns if column.startswith(_ALSO)]
     texts = joined(flights, [key for key in keys if key in flights])
     has_airframe = [PLANTS[plant].has_airframe for plant in flights["plant"]]
     rows = [text if of_airframe else "" for text, of_airframe in zip(texts, has_airframe, strict=True)]
-    unknown = [math.nan] * len(columns)
+    unknown = [math.nan] * len(names)
     known = {"": unknown}
     for position, text in enumerate(rows):
         if text not in known:
             flight = _flight(flights.iloc[position].to_dict())
-            found = unknown if flight is None else [math.nan if x is None else x for x in numbers(flight)]
-            known[text] = found
-    table = np.array([known[text] for text in rows], np.float64).reshape(-1, len(columns))
-    return flights.assign(**{name: table[:, i] for i, name in enumerate(columns)})
+            found = predicted(flight, names).values() if flight else unknown
+            known[text] = [math.nan if x is None else x for x in found]
+    table = np.array([known[text] for text in rows], np.float64).reshape(-1, len(names))
+    return flights.assign(**{name: table[:, i] for i, name in enumerate(names)})
 
 
 def _flight(row: Mapping[Any, Any]) -> Flight | None:
