@@ -18,9 +18,18 @@ from harness.cli._paths import PATH
 @click.option(
     "--fit", type=PATH, metavar="FILE.toml", help="Write the aircraft of this flight: lagged and coordinated."
 )
+@click.option("--rrd", type=PATH, help="Write a Rerun recording to this file.")
+@click.option("--out", type=PATH, metavar="PAGE.html", help="Write what is said, with pictures, as one page.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 def assess(
-    logs: tuple[Path, ...], map_name: str | None, begin: float, end: float, fit: Path | None, as_json: bool
+    logs: tuple[Path, ...],
+    map_name: str | None,
+    begin: float,
+    end: float,
+    fit: Path | None,
+    rrd: Path | None,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Judge the assumption on the log of a real flight.
 
@@ -37,12 +46,12 @@ def assess(
     \b
     Examples:
       harness assess flight.ulg --from 60 --to 300
-      harness assess alfa/ --map alfa --json
+      harness assess alfa/ --map alfa --rrd flight.rrd --out flight.html
       harness assess flight.bin --fit my_flight.toml
     """
     import json
 
-    from harness.cli._input import BadInput
+    from harness.cli._input import BadInput, typed
     from harness.cli._paths import writable
     from harness.files import write_text
     from harness.recorded import contents, fitted_plant, said
@@ -51,14 +60,23 @@ def assess(
 
     if not begin < end:
         raise BadInput(f"--from {begin:g} --to {end:g}: the first must be less than the second")
+    for path in filter(None, (fit, rrd, out)):
+        writable(path)
     whole = read_log(logs, map_name)
     flight = whole.between(begin, end)
     if not flight.channels:
         raise BadInput(f"--from {begin:g} --to {end:g}: the log goes from {whole.begin:.2f} to {whole.end:.2f} s")
     found = assessed(whole, begin, end)
-    if fit:
-        writable(fit)
+    if fit is not None:
         write_text(fit, fitted_plant.document(found))
+    if rrd is not None:
+        from harness.recorded.recording import write_recording_of
+
+        write_recording_of(rrd, whole, found, typed())
+    if out is not None:
+        from harness.recorded.page import page
+
+        write_text(out, page(whole, found, typed()))
     if as_json:
         click.echo(json.dumps({**contents.as_json(flight), "assessment": said.as_json(found)}, indent=2))
         return

@@ -10,6 +10,9 @@ from harness.tables import number, table
 SHOWN = {"rad": ("deg", 180.0 / math.pi), "rad/s": ("deg/s", 180.0 / math.pi)}
 
 
+HEADINGS = ("channel", "new values\n/s", "rows\n/s", "longest gap\ns", "least", "greatest", "unit", "what it is")
+
+
 def contents(flight: RecordedFlight) -> Iterator[str]:
     """The lines that tell what was read."""
     files = flight.sources[0] if len(flight.sources) == 1 else f"{len(flight.sources)} files"
@@ -18,8 +21,7 @@ def contents(flight: RecordedFlight) -> Iterator[str]:
         yield f"vehicle: {flight.vehicle}"
     yield f"clock: {flight.clock}; times in s since the log's first row"
     yield ""
-    headings = ["channel", "new values\n/s", "rows\n/s", "longest gap\ns", "least", "greatest", "unit", "what it is"]
-    yield from table(headings, (_row(name, flight) for name in QUANTITIES if name in flight), "lrrrrrl")
+    yield from table(HEADINGS, rows(flight), "lrrrrrl")
     yield ""
     for event in flight.events:
         yield f"at {event.time:.1f} s: {event.text}"
@@ -29,6 +31,11 @@ def contents(flight: RecordedFlight) -> Iterator[str]:
         yield f"note: {problem}"
     for refusal in flight.refusals:
         yield f"cannot be judged: {refusal}"
+
+
+def rows(flight: RecordedFlight) -> Iterator[list[str]]:
+    """The cells below `HEADINGS`, a row for each channel."""
+    return (_row(name, flight) for name in QUANTITIES if name in flight)
 
 
 def duration(flight: RecordedFlight) -> float:
@@ -56,13 +63,10 @@ def as_json(flight: RecordedFlight) -> dict[str, Any]:
 def _row(name: str, flight: RecordedFlight) -> list[str]:
     channel = flight[name]
     unit, scale = SHOWN.get(QUANTITIES[name].unit, (QUANTITIES[name].unit, 1.0))
-    span = channel.time[-1] - channel.time[0]
     what = ", ".join(filter(None, (channel.basis, channel.note)))
     least, greatest = (number(float(value), scale) for value in (channel.values.min(), channel.values.max()))
-    return [
-        name, _finite(channel.rate), _finite(channel.rows / span if span else 0.0), _finite(channel.longest_gap), least,
-        greatest, unit, what,
-    ]  # fmt: skip
+    rates = channel.rate, channel.rate * channel.rows / len(channel), channel.longest_gap
+    return [name, *map(_finite, rates), least, greatest, unit, what]
 
 
 def _finite(value: float) -> str:

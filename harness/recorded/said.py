@@ -9,6 +9,8 @@ from harness.recorded.assessment import CANNOT, Assessment, PartFinding
 from harness.tables import number, table
 from harness.vocabulary import Verdict
 
+HEADINGS = ("part", "it", "value", "95 % interval", "unit", "windows", "")
+
 
 def lines(found: Assessment) -> Iterator[str]:
     """What the flight says of the assumption, and what it does not say."""
@@ -21,10 +23,9 @@ def lines(found: Assessment) -> Iterator[str]:
     if judged:
         yield f"What the flight from {found.begin:.1f} to {found.end:.1f} s says of the assumption:"
         yield ""
-        headings = ["part", "it", "value", "95 % interval", "unit", "windows", ""]
-        yield from table(headings, map(_row, judged), "llrrlrl")
+        yield from table(HEADINGS, map(row, judged), "llrrlrl")
         yield ""
-        yield from _wind(found)
+        yield from wind_line(found)
         yield from found.notes
     if refused:
         yield ""
@@ -32,7 +33,8 @@ def lines(found: Assessment) -> Iterator[str]:
         yield from table([], ([f"  {finding.part.title}", finding.reason] for finding in refused), "ll")
 
 
-def _row(finding: PartFinding) -> list[str]:
+def row(finding: PartFinding) -> list[str]:
+    """The cells below `HEADINGS`."""
     bound = finding.word == Verdict.UNDECIDED and finding.low == 0.0
     interval = "" if bound else f"{number(finding.low)} to {number(finding.high)}"
     reason = finding.reason
@@ -42,7 +44,8 @@ def _row(finding: PartFinding) -> list[str]:
     return [finding.part.title, finding.word, value, interval, finding.part.unit, str(finding.windows), reason]
 
 
-def _wind(found: Assessment) -> Iterator[str]:
+def wind_line(found: Assessment) -> Iterator[str]:
+    """The wind, where it is known."""
     if not found.wind:
         return
     parts = [

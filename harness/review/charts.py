@@ -123,7 +123,7 @@ def _map(flights: Sequence[StyledFlight]) -> Chart:
     everything = np.vstack([strip for line in lines for strip in line.strips])
     centre = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
     half = 0.54 * float(np.ptp(everything, axis=0).max())
-    x, y = (_axis(float(c - half), float(c + half), _HEIGHT, "m") for c in centre)
+    x, y = (axis(float(c - half), float(c + half), _HEIGHT, "m") for c in centre)
     for i, flight in enumerate(flights, 2):
         labels.append((float(east[-1]), float(north[-1]) - 0.1 * half * i, flight.name, flight.colour))
     wind = longest.flight.wind.steady
@@ -147,7 +147,7 @@ def _around(flights: Sequence[StyledFlight]) -> Chart:
     values = np.concatenate([strip[:, 1] for line in lines for strip in line.strips] or [np.zeros(1)])
     reach = max(float(np.abs(values).max()), 1e-6) * 1.1
     compass = [(90.0 * i, name) for i, name in enumerate(("N", "E", "S", "W", "N"))]
-    y = _axis(-reach, reach, _HEIGHT, "m")
+    y = axis(-reach, reach, _HEIGHT, "m")
     zero = ChartLine([np.array(((0.0, 0.0), (360.0, 0.0)))], GREY, 1.0)
     of = ", mean of all laps" if is_crowd(flights) else ""
     return Chart(
@@ -198,7 +198,7 @@ def _spectrum(flights: Sequence[StyledFlight]) -> Chart:
     return Chart("spectrum", "Spectrum of the law's command while circling is judged [deg/s]", x, y, lines, labels)
 
 
-def _axis(low: float, high: float, length: float, unit: str) -> ChartAxis:
+def axis(low: float, high: float, length: float, unit: str) -> ChartAxis:
     """An axis with round ticks."""
     least = (high - low) / _MOST_TICKS
     decade = 10.0 ** math.floor(math.log10(least))
