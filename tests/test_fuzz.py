@@ -139,10 +139,11 @@ CALLS: Mapping[str, Sequence[str]] = {
     ],
     "assess": [
         "LOG", "LOG --map MAP", "LOG --from WORD", "LOG --json --from 1 --to 2", "LOG --rrd OUT/a --out OUT/b",
-        "LOG --out OUT/WORD", "LOG --map WORD", "WORD --map MAP",
+        "LOG --out OUT/WORD", "LOG --fit OUT/a", "LOG --map WORD", "WORD --map MAP",
     ],
     "validate": [
-        "AIRFRAME --with LOG --map MAP", "aerosonde --with LOG", "WORD --with LOG", "aerosonde --with LOG --save OUT/WORD",
+        "AIRFRAME --with LOG --map MAP", "aerosonde --with LOG", "WORD --with LOG",
+        "aerosonde --with LOG --save OUT/WORD",
     ],
     "init": ["OUT/a.toml", "FILE", "OUT/WORD", "--law OUT/a.py", "--law LAW"],
     "run": [
