@@ -94,6 +94,8 @@ def test_a_law_below_the_floor_is_told() -> None:
 def test_the_page_says_what_was_flown_and_each_condition_by_itself(flights: "pd.DataFrame") -> None:
     each = compared(flights)
     text = page(flights, each, list(above_floor(flights, read_floor(FLOOR))), "out/laws")
+    assert "\n- The order: of 2 comparisons of two laws by range error, 0 are shown to be reversed on sixdof." in text
+    assert text.index("- The order") < text.index("![") < text.index("| condition |")  # the answer comes first
     assert "48 flights: 2 laws (nftsm behind_inner_loop, nftsm scaled), each with 6 seeds" in text
     assert "| still air | ultra_stick_25e | 2 |" in text
     assert "| moderate turbulence | ultra_stick_25e | 2 |" in text

@@ -277,6 +277,8 @@ def page(table: "pd.DataFrame", each: Sequence[Compared], above: Sequence[Above]
     for one in above:
         by_law.setdefault(one.law, {})[one.aircraft] = one
     overstated = [one.on_reference / one.activity for one in above]
+    keeping = kept(table)
+    beaten = [(beaten_by(of, PAPERS, REFERENCE), beaten_by(of, PAPERS, AIRCRAFT)) for of in each] if keeping else []
     fields = {
         "folder": folder,
         "each": each,
@@ -299,7 +301,15 @@ def page(table: "pd.DataFrame", each: Sequence[Compared], above: Sequence[Above]
         "overstated": (min(overstated), max(overstated)) if overstated else None,
         "beaten_by": beaten_by,
         "papers": PAPERS,
-        "kept": kept(table),
+        "kept": keeping,
+        "keepers": Counter(law for laws in keeping.values() for law in laws).most_common(2),
+        "most_beaten": [max((count[0] for count in counts), default=0) for counts in zip(*beaten, strict=True)]
+        + [max((on_aircraft[1] for _, on_aircraft in beaten), default=0)],
+        "turned": {
+            "pairs": sum(of.reversed for of in each),
+            "of": sum(of.error.undecided(AIRCRAFT)[1] for of in each),
+            "where": list(dict.fromkeys(of.condition for of in each if of.reversed)),
+        },
         "lost": Counter(
             (law, of.condition) for of in each for order in of.error.orders.values() for law in order.left_out
         ),
