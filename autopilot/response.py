@@ -17,6 +17,7 @@ from autopilot.quantities import About, Seconds
 Array = NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
+ORDER = 5  # states of a `Response`
 LONGEST = 50_000_000  # ns: longer intervals are cut into equal pieces, so that the nodes resolve the motion
 
 
@@ -185,64 +186,66 @@ class Piece(NamedTuple):
     outputs: Rows  # the output at each of Gauss's nodes
     integrals: Rows  # the output's integral up to each node, then up to the end
     end: Rows  # the states at the end
+    airspeed: Rows = ()  # of the plant `coordinated`
 
 
-class Propagator:
-    """A response in time, started at rest: exact while a command is held, for any delay. Counts time in nanoseconds."""
+class Held(NamedTuple):
+    """A piece of a period: its length, and the command that acts in it."""
 
-    def __init__(self, response: Response, nodes: int) -> None:
-        A, b, c = response.matrices()
-        n = self._order = len(b)
-        system = np.zeros((n + 2, n + 2))  # of the states, the output's integral, and the input
-        system[:n, :n], system[:n, -1], system[n, :n] = A, b, c
-        self._system, self._output = system, _row(c)
-        self._slope = (*_row(c @ A), float(c @ b))
-        self._nodes = gauss(nodes)[0]
-        self._pieces: dict[int, tuple[int, Piece]] = {}
-        self._delay = round(response.delay * 1e9)
-        self._input = 0.0
+    command: float
+    length: int  # ns
+
+
+class Delay:
+    """The commands on their way to a plant that gets each of them `delay` ns late. Counts time in nanoseconds."""
+
+    def __init__(self, delay: int) -> None:
+        self._delay, self._input = delay, 0.0
         self._coming: deque[tuple[int, float]] = deque()  # (time until it acts, command)
-        self._states = (0.0,) * n
 
-    @property
-    def output(self) -> float:
-        """The output now, in the unit of the command."""
-        return dot(self._output, self._states)
-
-    @property
-    def slope(self) -> float:
-        """The output's rate of change now, per second."""
-        return dot(self._slope, (*self._states, self._input))
-
-    def pieces(self, command: float, period: float) -> Iterator[tuple[tuple[float, ...], Piece]]:
-        """Moves on by `period` seconds with `command` given now, in pieces within which the delayed input is constant.
-
-        Yields for each piece the vector (states, input) at its start, and the `Piece` whose rows multiply it.
-        """
+    def pieces(self, command: float, period: float) -> Iterator[Held]:
+        """Moves on by `period` seconds with `command` given now, in pieces within which what acts is constant."""
         self._coming.append((self._delay, command))
         left = round(period * 1e9)
         while left:
             while self._coming and self._coming[0][0] == 0:
                 self._input = self._coming.popleft()[1]
             length = min(left, self._coming[0][0]) if self._coming else left
-            count, piece = self._piece(length)
-            for _ in range(count):
-                now = (*self._states, self._input)
-                yield now, piece
-                self._states = tuple([dot(row, now) for row in piece.end])
+            yield Held(self._input, length)
             self._coming = deque([(time - length, value) for time, value in self._coming])
             left -= length
 
-    def _piece(self, length: int) -> tuple[int, Piece]:
+
+class Propagator:
+    """A response while its input is held: exact over any interval. Its `delay`, ns, is not in it."""
+
+    def __init__(self, response: Response, nodes: int) -> None:
+        A, b, c = response.matrices()
+        n = self._order = len(b)
+        system = np.zeros((n + 2, n + 2))  # of the states, the output's integral, and the input
+        system[:n, :n], system[:n, -1], system[n, :n] = A, b, c
+        self._system, self._nodes = system, gauss(nodes)[0]
+        self._pieces: dict[int, tuple[int, Piece]] = {}
+        self.output = _row(c)  # multiplies the states
+        self.slope = (*_row(c @ A), float(c @ b))  # multiplies (states, input): the output's rate of change
+        self.delay = round(response.delay * 1e9)
+
+    def piece(self, length: int) -> tuple[int, Piece]:
         """The number of equal pieces in an interval of `length` nanoseconds, and the piece."""
         if length not in self._pieces:
             count = -(-length // LONGEST)
             h, n = 1e-9 * length / count, self._order
             ways = [np.delete(_expm(self._system * (share * h)), n, axis=1) for share in (*self._nodes, 1.0)]
-            outputs = [_row(np.array(self._output) @ way[:n]) for way in ways[:-1]]
+            outputs = [_row(np.array(self.output) @ way[:n]) for way in ways[:-1]]
             integrals, end = [_row(way[n]) for way in ways], [_row(row) for row in ways[-1][:n]]
             self._pieces[length] = count, Piece(h, tuple(outputs), tuple(integrals), tuple(end))
         return self._pieces[length]
+
+
+def moved_on(end: Rows, vector: tuple[float, ...]) -> tuple[float, float, float, float, float]:
+    """The states at the end of a piece, from the vector (states, input) at its start."""
+    a, b, c, d, e = end[0], end[1], end[2], end[3], end[4]
+    return dot(a, vector), dot(b, vector), dot(c, vector), dot(d, vector), dot(e, vector)
 
 
 def _row(values: Array) -> tuple[float, ...]:

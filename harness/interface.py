@@ -145,6 +145,7 @@ def run(
     overrides: Sequence[str] = (),
     retry_failed: bool = False,
     timeout: float | None = None,
+    engine: str | None = None,
     progress: bool = False,
 ) -> "pd.DataFrame":
     """Flies the matrix of a settings file into a directory, and returns its results as `load_results` does.
@@ -162,15 +163,17 @@ def run(
     - `retry_failed`: fly those again that are invalid; those that timed out or lost their worker are in any case.
     - `timeout`: a flight hangs, and is ended, when it gains no simulated time while its worker computes for so many s;
       None is 60.
+    - `engine`: "python" or "compiled"; None is compiled where that can be and is quicker. The results are the same.
     - `progress`: print how far it is to standard error, once a second.
 
     Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
-    used; `WorkersError` when the processes cannot fly; `ArgumentError` for an option that there is not. A flight that
-    fails is a row, not an error.
+    used; `WorkersError` when the processes cannot fly; `ArgumentError` for an option that there is not;
+    `HarnessError` for flights that the engine "compiled" cannot fly. A flight that fails is a row, not an error.
 
     >>> results = harness.run("experiments/gains.toml", out="out/gains", progress=True)
     >>> results.groupby("plant")["convergence_time_s"].median()
     """
+    from harness.runs.engine import ENGINES, engine_for
     from harness.runs.matrix import read_matrix
     from harness.runs.results import export, load_results
     from harness.runs.run import LOGS, Options, positions_done
@@ -188,6 +191,8 @@ def run(
         raise ArgumentError("timeout needs a worker to end: workers must be None or at least 1")
     if log is not None and log not in LOGS:
         raise ArgumentError(f"log is {log!r}, must be None or one of {', '.join(LOGS)}")
+    if engine is not None and engine not in ENGINES:
+        raise ArgumentError(f"engine is {engine!r}, must be None or one of {', '.join(ENGINES)}")
     path, out = Path(path), Path(out)
     workers = (os.cpu_count() or 1) if workers is None else workers
     matrix = read_matrix(read_settings(path, overrides), draft=True)
@@ -199,6 +204,7 @@ def run(
         retry_failed=retry_failed,
         timeout=timeout or TIMEOUT,
         typical=size.typical,
+        compiled=engine_for(size, engine).compiled,
     )
     states = fly(matrix, out, options)
     for _ in _printed(states) if progress else states:

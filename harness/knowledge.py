@@ -3,6 +3,9 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from autopilot.estimator import Estimator, Measurement, measurement
 from harness.flight import Flight
 from harness.plants.plant import End, Outcome
@@ -22,20 +25,28 @@ class Instruments:
     def __init__(self, flight: Flight) -> None:
         errors = flight.errors
         self.wind = errors.estimated(flight.wind.steady)
-        self._scale, self._deviation = errors.airspeed_scale, errors.course_noise
+        self.scale, self._deviation = errors.airspeed_scale, errors.course_noise
         self._noise = stream(flight.seed, "course")
+
+    def turns(self, steps: int) -> NDArray[np.float64]:
+        """The errors of the course at so many guidance steps, rad; none where the course is exact."""
+        return self._deviation * self._noise.standard_normal(steps if self._deviation else 0)
 
     def read(self, state: State) -> State:
         """The aircraft's state as it is measured at the next guidance step."""
-        if self._scale != 1.0:
-            state = state._replace(airspeed=self._scale * state.airspeed)
+        if self.scale != 1.0:
+            state = state._replace(airspeed=self.scale * state.airspeed)
         if self._deviation:
-            turned = self._deviation * self._noise.standard_normal()
-            c, s = math.cos(turned), math.sin(turned)
-            v_x, v_y = state.velocity_north, state.velocity_east
-            v_x, v_y = c * v_x - s * v_y, s * v_x + c * v_y
+            turn = self._deviation * self._noise.standard_normal()
+            v_x, v_y = turned(state.velocity_north, state.velocity_east, turn)
             state = state._replace(velocity_north=v_x, velocity_east=v_y, heading=heading_in(self.wind, v_x, v_y))
         return state
+
+
+def turned(v_x: float, v_y: float, turn: float) -> tuple[float, float]:
+    """A velocity turned by this angle, rad, clockwise."""
+    c, s = math.cos(turn), math.sin(turn)
+    return c * v_x - s * v_y, s * v_x + c * v_y
 
 
 def heading_in(wind: tuple[float, float], velocity_north: float, velocity_east: float) -> float:

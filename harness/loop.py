@@ -73,7 +73,7 @@ def simulate(
             if watch:
                 watch(time, log_so_far)
             if monitoring_range and math.dist(state[:2], truth[:2]) > monitoring_range:
-                raise End(Outcome.TARGET_LOST, f"beyond the monitoring range, {monitoring_range:g} m")
+                raise lost(flight)
 
             if k < last:
                 flying.advance(guidance.heading_rate, period)
@@ -96,6 +96,11 @@ def observe(
     if state.wind_north != W_x or state.wind_east != W_y:
         state = state._replace(heading=heading_in(wind, state.velocity_north, state.velocity_east))
     return Observation._make((*state[:_OWN], nominal_airspeed, *wind, *estimate, time))
+
+
+def lost(flight: Flight) -> End:
+    """The end of a flight whose aircraft is too far from its target."""
+    return End(Outcome.TARGET_LOST, f"beyond the monitoring range, {flight.metrics.monitoring_range:g} m")
 
 
 def begun(law: Law, context: Context) -> LawStep:

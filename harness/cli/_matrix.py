@@ -85,6 +85,17 @@ def print_time(size: Survey, done: int, workers: int, log: str | None) -> None:
     )
 
 
+def engine_of(size: Survey, asked: str | None, times: float = 1.0) -> bool:
+    """Whether flights are compiled where they can be: see `engine_for`. Says which law of one's own is not."""
+    from harness.runs.engine import engine_for
+
+    with busy("compiling"):
+        engine = engine_for(size, asked, times)
+    for note in engine.notes:
+        click.echo(f"note: {note}; Python flies it, some ten times slower", err=True)
+    return engine.compiled
+
+
 def fly_matrix(matrix: Matrix, out: Path, options: Options) -> Progress:
     """Flies what is not done yet, shows how far it is, and prints the table of results.
 

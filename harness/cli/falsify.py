@@ -25,6 +25,9 @@ _MOST_LINES = 5  # of the table of the worst
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+)
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the text.")
 def falsify(
@@ -37,6 +40,7 @@ def falsify(
     workers: int | None,
     overrides: tuple[str, ...],
     retry: str | None,
+    engine: str | None,
     flight_timeout: float | None,
     as_json: bool,
 ) -> None:
@@ -64,7 +68,7 @@ def falsify(
           --requirement 'outcome = completed'
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import flown_out, print_survey, processes, surveyed
+    from harness.cli._matrix import engine_of, flown_out, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
@@ -97,7 +101,11 @@ def falsify(
         trials = flights // len(space.conditions)
         typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
         options = Options(
-            workers=workers, retry_failed=retry is not None, timeout=flight_timeout or TIMEOUT, typical=typical
+            workers=workers,
+            retry_failed=retry is not None,
+            timeout=flight_timeout or TIMEOUT,
+            typical=typical,
+            compiled=engine_of(middle, engine, trials),
         )
         progress = flown_out(search.fly(out, options), out)
         with busy("writing the table of flights"):

@@ -34,6 +34,9 @@ _PICTURES = ("map.png", PICTURE)
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+)
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 def map_(
     file: Path,
@@ -46,6 +49,7 @@ def map_(
     workers: int | None,
     overrides: tuple[str, ...],
     retry: str | None,
+    engine: str | None,
     flight_timeout: float | None,
 ) -> None:
     """Map where the answer changes over two settings.
@@ -70,7 +74,7 @@ def map_(
           --y start.heading_deg=0:360 --set plant=kinematic
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import flown_out, print_endings, print_survey, processes, surveyed
+    from harness.cli._matrix import engine_of, flown_out, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.drawing import save
@@ -95,7 +99,12 @@ def map_(
         writable_folder(out)
         print_survey(space.matrix, middle, 0)
         _print_search(found)
-        options = Options(workers=workers, retry_failed=retry is not None, timeout=flight_timeout or TIMEOUT)
+        options = Options(
+            workers=workers,
+            retry_failed=retry is not None,
+            timeout=flight_timeout or TIMEOUT,
+            compiled=engine_of(middle, engine, found.flights / middle.flights),
+        )
         progress = flown_out(found.fly(out, options), out)
         with busy("writing the table of flights"):
             export(out)

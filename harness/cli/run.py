@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     help="Set a key, or several values of it; repeatable.",
 )
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+)
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--dry-run", is_flag=True, help="Print the size of the matrix, its warnings and the time it takes.")
 def run(
@@ -49,6 +52,7 @@ def run(
     log: str | None,
     overrides: tuple[str, ...],
     retry: str | None,
+    engine: str | None,
     flight_timeout: float | None,
     dry_run: bool,
 ) -> None:
@@ -67,13 +71,13 @@ def run(
       harness run experiments/wind.toml --out out/wind_2 --shard 2/4
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import fly_matrix, print_survey, print_time, processes, surveyed
+    from harness.cli._matrix import engine_of, fly_matrix, print_survey, print_time, processes, surveyed
     from harness.cli._paths import writable_folder
+    from harness.error import HarnessError
     from harness.runs.matrix import read_matrix
     from harness.runs.run import Options, positions_done
-    from harness.runs.store import StoreError
-    from harness.runs.workers import TIMEOUT, WorkersError
-    from harness.settings import SettingsError, read_settings
+    from harness.runs.workers import TIMEOUT
+    from harness.settings import read_settings
 
     if out is None and not dry_run:
         raise BadInput("--out DIR is missing: the folder of the results")
@@ -88,6 +92,7 @@ def run(
         if dry_run or out is None:
             print_time(size, len(done), max(1, workers), log)
             return
+        compiled = engine_of(size, engine)
         timeout = flight_timeout or TIMEOUT
         options = Options(
             workers=workers,
@@ -96,9 +101,10 @@ def run(
             retry_failed=retry is not None,
             timeout=timeout,
             typical=size.typical,
+            compiled=compiled,
         )
         progress = fly_matrix(matrix, out, options)
-    except (SettingsError, StoreError, WorkersError) as error:
+    except HarnessError as error:
         raise BadInput(str(error)) from None
     except OSError as error:
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None

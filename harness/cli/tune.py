@@ -39,6 +39,9 @@ _MOST_LINES = 30  # of a front
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+)
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 def tune(
     file: Path,
@@ -52,6 +55,7 @@ def tune(
     workers: int | None,
     overrides: tuple[str, ...],
     retry: str | None,
+    engine: str | None,
     flight_timeout: float | None,
 ) -> None:
     """Search for the settings that do best.
@@ -76,7 +80,7 @@ def tune(
           --minimise range_error_peak_m --minimise convergence_time_s --subject-to 'range_error_peak_m < 5'
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import flown_out, print_endings, print_survey, processes, surveyed
+    from harness.cli._matrix import engine_of, flown_out, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
@@ -102,7 +106,11 @@ def tune(
         trials = flights // len(space.conditions)
         typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
         options = Options(
-            workers=workers, retry_failed=retry is not None, timeout=flight_timeout or TIMEOUT, typical=typical
+            workers=workers,
+            retry_failed=retry is not None,
+            timeout=flight_timeout or TIMEOUT,
+            typical=typical,
+            compiled=engine_of(middle, engine, trials),
         )
         progress = flown_out(search.fly(out, options), out, "looking for settings that meet what is known beforehand")
         with busy("writing the table of flights"):

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -10,8 +10,8 @@ from annotated_types import Gt
 
 from autopilot.angles import wrap
 from autopilot.quantities import About
-from autopilot.response import Propagator, Response, dot, gauss
-from harness.plants.level import Level
+from autopilot.response import ORDER, Piece, Propagator, Response, dot, gauss, moved_on
+from harness.plants.level import InPieces, Level, Motion, MovingInPieces, States, at_start
 from harness.plants.plant import Flying, Start
 from harness.plants.turn import GRAVITY, bank_of_turn
 from harness.world.air import Air
@@ -49,36 +49,51 @@ class Coordinated:
     bank_limit: float  # rad
 
     def start(self, start: Start, air: Air) -> Flying:
-        return _CoordinatedFlying(self, start, air)
+        return Level(start, air, MovingInPieces(motion(self, start.airspeed)), Motion(*at_start(start), 0.0, 0.0, 0.0))
 
 
-class _CoordinatedFlying:
-    def __init__(self, plant: Coordinated, start: Start, air: Air) -> None:
-        self._propagator, self._level = Propagator(plant.bank, _NODES), Level(start, air)
-        self._hold, self._limit, self._nominal = plant.airspeed, plant.bank_limit, start.airspeed
-        self._change = self._summed = 0.0  # the change of airspeed, m/s, and its integral, m
-        self.state = self._level.state(*start.position, start.airspeed, wrap(start.heading), 0.0, 0.0, 0.0, 0.0)
+@lru_cache(maxsize=64)
+def motion(plant: Coordinated, nominal: float) -> InPieces:
+    """The motion of this plant from rest; `nominal` is its airspeed then, m/s."""
+    propagator, limit = Propagator(plant.bank, _NODES), plant.bank_limit
+    output, slope = propagator.output, propagator.slope
 
-    def advance(self, heading_rate: float, period: float) -> None:
-        propagator = self._propagator
-        x, y, psi = self.state.north, self.state.east, self.state.heading
-        command = bank_command(heading_rate, self._nominal, self._limit)
-        for now, piece in propagator.pieces(command, period):
-            h = piece.length
-            tangents = [math.tan(dot(row, now)) for row in piece.outputs]
-            excess = [math.sqrt(1.0 + t * t) - 1.0 for t in tangents]
-            moved = (self._change, self._summed, *excess)
-            *changes, self._change, self._summed = [dot(row, moved) for row in _airspeed_rows(self._hold, h)]
-            speeds = [self._nominal + change for change in changes]
-            rates = [GRAVITY * t / V for t, V in zip(tangents, speeds, strict=True)]
-            headings = [psi + h * dot(row, rates) for row in _TO_NODES]
-            x += h * dot(_WEIGHTS, [V * math.cos(angle) for V, angle in zip(speeds, headings, strict=True)])
-            y += h * dot(_WEIGHTS, [V * math.sin(angle) for V, angle in zip(speeds, headings, strict=True)])
-            psi += h * dot(_WEIGHTS, rates)
-        north, east = self._level.carried(period)
-        bank, V = propagator.output, self._nominal + self._change
-        rate = GRAVITY * math.tan(bank) / V
-        self.state = self._level.state(x + north, y + east, V, wrap(psi), rate, bank, propagator.slope, command)
+    @cache
+    def of_length(length: int) -> tuple[int, Piece]:
+        count, piece = propagator.piece(length)
+        return count, piece._replace(airspeed=_airspeed_rows(plant.airspeed, piece.length))
+
+    def commanded(heading_rate: float) -> float:
+        return bank_command(heading_rate, nominal, limit)
+
+    def banked(now: Motion, states: States, acts: float, piece: Piece) -> tuple[Motion, States]:
+        """Over a piece. The states are those of the bank, the change of airspeed, m/s, and its integral, m."""
+        x, y, _, psi, _, _, _, _ = now
+        h, vector, rows = piece.length, (*states[:ORDER], acts), piece.outputs
+        t_1, t_2, t_3 = math.tan(dot(rows[0], vector)), math.tan(dot(rows[1], vector)), math.tan(dot(rows[2], vector))
+        drive = (*states[ORDER:], excess(t_1), excess(t_2), excess(t_3))
+        rows = piece.airspeed
+        V_1, V_2, V_3 = nominal + dot(rows[0], drive), nominal + dot(rows[1], drive), nominal + dot(rows[2], drive)
+        rates = (GRAVITY * t_1 / V_1, GRAVITY * t_2 / V_2, GRAVITY * t_3 / V_3)
+        a_1, a_2, a_3 = _TO_NODES
+        psi_1, psi_2, psi_3 = psi + h * dot(a_1, rates), psi + h * dot(a_2, rates), psi + h * dot(a_3, rates)
+        x += h * dot(_WEIGHTS, (V_1 * math.cos(psi_1), V_2 * math.cos(psi_2), V_3 * math.cos(psi_3)))
+        y += h * dot(_WEIGHTS, (V_1 * math.sin(psi_1), V_2 * math.sin(psi_2), V_3 * math.sin(psi_3)))
+        change, summed = dot(rows[3], drive), dot(rows[4], drive)
+        return Motion(x, y, nominal, psi + h * dot(_WEIGHTS, rates)), (*moved_on(piece.end, vector), change, summed)
+
+    def ended(now: Motion, states: States, acts: float, given: float) -> Motion:
+        V, bank = nominal + states[ORDER], states[:ORDER]
+        phi = dot(output, bank)
+        rate = GRAVITY * math.tan(phi) / V
+        return Motion(now.north, now.east, V, wrap(now.heading), rate, phi, dot(slope, (*bank, acts)), given)
+
+    return InPieces((0.0,) * (len(output) + 2), commanded, banked, ended, propagator, of_length)
+
+
+def excess(tangent: float) -> float:
+    """The load factor beyond one in a coordinated turn, from the tangent of the bank."""
+    return math.sqrt(1.0 + tangent * tangent) - 1.0
 
 
 def bank_command(heading_rate: float, airspeed: float, limit: float) -> float:

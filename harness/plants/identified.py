@@ -4,6 +4,7 @@ import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -87,13 +88,18 @@ def read(airframe: Path) -> list[Identified]:
     if not file.is_file():
         return []
     try:
-        tables = tables_of(file.read_text(encoding="utf-8"))["at"]
-        return sorted((_from(table) for table in tables), key=lambda entry: entry.airspeed)
+        return list(_entries(file.read_text(encoding="utf-8")))
     except (AttributeError, LookupError, TypeError, ValueError, ArithmeticError) as error:
         again = f"run harness identify {aircraft.argument(airframe)} --keep"
         if aircraft.is_recorded(airframe):
             again = "write it anew with harness assess --fit"
         raise IdentifiedError(f"{file}: is damaged ({type(error).__name__}: {error}): {again}") from None
+
+
+@lru_cache(maxsize=16)
+def _entries(text: str) -> tuple[Identified, ...]:
+    """All identifications in the text of a file, by airspeed."""
+    return tuple(sorted((_from(table) for table in tables_of(text)["at"]), key=lambda entry: entry.airspeed))
 
 
 def is_stale(airframe: Path) -> bool:

@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 from autopilot.angles import wrap
-from autopilot.response import Propagator, Response, dot, gauss
-from harness.plants.level import Level
+from autopilot.response import Piece, Propagator, Response, dot, gauss, moved_on
+from harness.plants.level import InPieces, Level, Motion, MovingInPieces, States, at_start
 from harness.plants.plant import Flying, Start
 from harness.world.air import Air
 
@@ -20,21 +21,30 @@ class Lagged:
     response: Response
 
     def start(self, start: Start, air: Air) -> Flying:
-        return _LaggedFlying(self.response, start, air)
+        return Level(start, air, MovingInPieces(motion(self.response)), Motion(*at_start(start)))
 
 
-class _LaggedFlying:
-    def __init__(self, response: Response, start: Start, air: Air) -> None:
-        self._propagator, self._level, self._airspeed = Propagator(response, _NODES), Level(start, air), start.airspeed
-        self.state = self._level.state(*start.position, start.airspeed, wrap(start.heading), 0.0)
+@lru_cache(maxsize=64)
+def motion(response: Response) -> InPieces:
+    """The motion behind this response, from rest."""
+    propagator = Propagator(response, _NODES)
+    output = propagator.output
 
-    def advance(self, heading_rate: float, period: float) -> None:
-        propagator, v_a = self._propagator, self._airspeed
-        x, y, psi = self.state.north, self.state.east, self.state.heading
-        for now, piece in propagator.pieces(heading_rate, period):
-            *turned, turn = [dot(row, now) for row in piece.integrals]
-            x += v_a * piece.length * dot(_WEIGHTS, [math.cos(psi + angle) for angle in turned])
-            y += v_a * piece.length * dot(_WEIGHTS, [math.sin(psi + angle) for angle in turned])
-            psi += turn
-        north, east = self._level.carried(period)
-        self.state = self._level.state(x + north, y + east, v_a, wrap(psi), propagator.output)
+    def commanded(heading_rate: float) -> float:
+        return heading_rate
+
+    def ended(now: Motion, states: States, acts: float, given: float) -> Motion:
+        return Motion(now.north, now.east, now.airspeed, wrap(now.heading), dot(output, states))
+
+    return InPieces((0.0,) * len(output), commanded, turned, ended, propagator, propagator.piece)
+
+
+def turned(now: Motion, states: States, acts: float, piece: Piece) -> tuple[Motion, States]:
+    """The motion over a piece."""
+    x, y, v_a, psi = now.north, now.east, now.airspeed, now.heading
+    vector, rows = (*states, acts), piece.integrals
+    a, b = psi + dot(rows[0], vector), psi + dot(rows[1], vector)
+    c, d = psi + dot(rows[2], vector), psi + dot(rows[3], vector)
+    x += v_a * piece.length * dot(_WEIGHTS, (math.cos(a), math.cos(b), math.cos(c), math.cos(d)))
+    y += v_a * piece.length * dot(_WEIGHTS, (math.sin(a), math.sin(b), math.sin(c), math.sin(d)))
+    return Motion(x, y, v_a, psi + dot(rows[4], vector)), moved_on(piece.end, vector)

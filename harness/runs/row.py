@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from harness.compiled import engine
 from harness.feasibility import feasibility_margin
 from harness.flight import Flight
 from harness.key import Identity, identity
@@ -67,13 +68,15 @@ def failed_result(outcome: Outcome, reason: str) -> FlightResult:
     return FlightResult(outcome.value, reason, "", dict.fromkeys(METRICS), {}, None)
 
 
-def simulate_safely(flight: Flight, watch: Watch | None = None) -> FlightLog:
+def simulate_safely(flight: Flight, watch: Watch | None = None, *, compiled: bool = False) -> FlightLog:
     """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others.
+
+    With `compiled` by a compiled loop where that can be: to the same bits.
 
     Raises MemoryError.
     """
     try:
-        return simulate(flight, watch)
+        return engine.simulate(flight, watch) if compiled else simulate(flight, watch)
     except MemoryError:
         raise  # the machine's fault, not the flight's
     except Exception as error:  # any kind: the other flights of the run are unaffected

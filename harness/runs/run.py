@@ -33,6 +33,7 @@ class Options:
     retry_failed: bool = False
     timeout: float = TIMEOUT  # s of a worker's own time in which a flight gains no simulated time
     typical: Mapping[str, float] = field(default_factory=dict)  # s: wall time of the flights to fly, by plant
+    compiled: bool = False  # flown by compiled loops where that can be
     fly: Fly = fly_task
 
 
@@ -182,7 +183,7 @@ def _tasks(
             _count_earlier(progress, earlier)
         elif this:
             pending[key] = Pending(this, earlier)
-            yield Task(key, position, flight, this.version.number, record)
+            yield Task(key, position, flight, this.version.number, record, options.compiled)
         met.add(key)
 
 

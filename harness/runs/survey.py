@@ -39,6 +39,7 @@ class Survey:
     mistakes: list[str] = field(default_factory=list)
     varies: dict[str, int] = field(default_factory=dict)  # the number of values of each axis
     warnings: dict[str, Warned] = field(default_factory=dict)  # by their text without numbers
+    examples: dict[object, Flight] = field(default_factory=dict)  # one flight of each kind that is compiled alike
 
     @property
     def idle_seeds(self) -> int:
@@ -89,6 +90,7 @@ def survey(matrix: Matrix, limit: int | None = None, done: Collection[int] = ())
         total.random += flight.random or bool(matrix.draws)
         total.typical[flight.plant] = total.typical.get(flight.plant, 0.0) + flight.seconds
         total.periods += flight.periods
+        total.examples.setdefault(flight.kind, flight.flight)
         if total.flights % 500 == 0:
             yield total
     if total.mistakes:
@@ -107,6 +109,8 @@ class _FlightSurvey:
     seconds: float
     periods: int
     start: object  # equal for flights that have the same start
+    kind: object  # equal for flights that are compiled alike
+    flight: Flight  # the first of those that are surveyed once
 
 
 class _Seen:
@@ -144,7 +148,8 @@ def _flight_survey(flight: Flight, slow: tuple[str, ...]) -> _FlightSurvey:
     errors = flight.errors
     random = flight.estimator.filters or flight.wind.turbulence != "none" or errors.course_noise > 0.0
     body = (flight.aircraft, errors.mass_scale, errors.cg_aft, errors.actuator_lag)
+    kind = (flight.plant, type(flight.law), flight.estimator.filters, bool(errors.command_delay))
     start = (flight.plant, *body, flight.step, flight.start.airspeed, flight.start.altitude)
     return _FlightSurvey(
-        (*warnings(flight), *slow), random, flight.plant, typical_wall_time(flight), flight.periods, start
+        (*warnings(flight), *slow), random, flight.plant, typical_wall_time(flight), flight.periods, start, kind, flight
     )

@@ -58,6 +58,7 @@ class Task(NamedTuple):
     flight: Flight
     version: str  # the number of its `Version` when the task was made
     record: str  # when to write a recording: all | failed | none
+    compiled: bool = False  # flown by a compiled loop where that can be
 
 
 class WorkerResult(NamedTuple):
@@ -82,7 +83,7 @@ def fly_task(task: Task, folder: Path) -> WorkerResult:
     """Flies a task, in a worker, and writes its recording if the task asks for one."""
     begin, problem = time.perf_counter(), ""
     try:
-        log = simulate_safely(task.flight, _note)
+        log = simulate_safely(task.flight, _note, compiled=task.compiled)
         _note(_NOT_IN_FLIGHT)
         result = result_of(log, time.perf_counter() - begin)
     except MemoryError:

@@ -93,6 +93,7 @@ def _tasks(
                 else:
                     waiting[this.key] = [(candidate, i)]
                     pending[this.key] = Pending(this, None)
-                    yield Task(this.key, position - 1, flight, this.version.number, options.log or "none")
+                    record = options.log or "none"
+                    yield Task(this.key, position - 1, flight, this.version.number, record, options.compiled)
         while waiting:
             yield None

@@ -63,3 +63,18 @@ class Air:
             return 0.0, 0.0
         north, east = (self._way[end] - self._way[begin]).tolist()
         return north, east
+
+    def sampled(self, period: float, count: int) -> tuple[Array, Array]:
+        """The air every `period` seconds: `horizontal` with the velocity down, and the way in each of `count` periods.
+
+        Of shapes (count + 1, 3), m/s, and (count, 2), m.
+        """
+        W_x, W_y = self.steady
+        velocity, way = np.zeros((count + 1, 3)), np.zeros((count, 2))
+        if len(self.gusts):
+            apart = round(period / self.step)
+            velocity[:] = self.gusts[: count * apart + 1 : apart]
+            way[:] = np.diff(self._way[: count * apart + 1 : apart], axis=0)
+        velocity[:, 0] += W_x
+        velocity[:, 1] += W_y
+        return velocity, way + np.array([W_x * period, W_y * period])

@@ -1,0 +1,283 @@
+"""Python's arithmetic for compiled functions: the bits and the errors of `math`, `**`, `min`, `max` and `sum`.
+
+Mathematical functions are those of the C library that this Python calls, under names of their own: by its name `pow`
+the compiler would know it and put a product in its place. What is not a number raises, as in Python.
+"""
+
+import ctypes
+import math
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import llvmlite.binding
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+nan, inf, minus_inf = math.nan, math.inf, -math.inf
+_PREFIX = "standoff_harness_"
+
+
+def jit(function: Function) -> Function:
+    """The function compiled: when it is first called, or called by a compiled one."""
+    made: Function = njit(function)
+    return made
+
+
+def _of_library(name: str, arguments: int) -> Any:
+    """The C library's function of this name, of so many floats, to be called in compiled code."""
+    library = ctypes.CDLL(None)
+    address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+    llvmlite.binding.add_symbol(_PREFIX + name, address)
+    signature = types.float64(*[types.float64] * arguments)
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()] * arguments)
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, _PREFIX + name), values)
+
+    if arguments == 1:
+
+        @intrinsic
+        def one(typing: Any, x: Any) -> Any:
+            return signature, generate
+
+        return one
+
+    @intrinsic
+    def two(typing: Any, x: Any, y: Any) -> Any:
+        return signature, generate
+
+    return two
+
+
+def _one(name: str) -> Any:
+    """A function of one number that raises where `math` does."""
+    of_library = _of_library(name, 1)
+
+    @jit
+    def checked(x: float) -> float:
+        y: float = of_library(x)
+        if not math.isfinite(y) and math.isfinite(x):
+            raise ValueError("math domain error")
+        if math.isnan(y) and not math.isnan(x):
+            raise ValueError("math domain error")
+        return y
+
+    return checked
+
+
+sin, cos, tan = _one("sin"), _one("cos"), _one("tan")
+asin, acos, atan = _one("asin"), _one("acos"), _one("atan")
+sinh, cosh, tanh = _one("sinh"), _one("cosh"), _one("tanh")
+exp, expm1, log, log1p = _one("exp"), _one("expm1"), _one("log"), _one("log1p")
+sqrt = _one("sqrt")
+_atan2, _pow = _of_library("atan2", 2), _of_library("pow", 2)
+_remainder, _fmod = _of_library("remainder", 2), _of_library("fmod", 2)
+
+
+@jit
+def atan2(y: float, x: float) -> float:
+    """`math.atan2`."""
+    angle: float = _atan2(y, x)
+    return angle
+
+
+@jit
+def copysign(x: float, y: float) -> float:
+    """`math.copysign`."""
+    return math.copysign(x, y)
+
+
+@jit
+def remainder(x: float, y: float) -> float:
+    """`math.remainder` of finite numbers."""
+    if y == 0.0 or not (math.isfinite(x) and math.isfinite(y)):
+        raise ValueError("math domain error")
+    rest: float = _remainder(x, y)
+    return rest
+
+
+@jit
+def fmod(x: float, y: float) -> float:
+    """`math.fmod` of finite numbers."""
+    if y == 0.0 or not (math.isfinite(x) and math.isfinite(y)):
+        raise ValueError("math domain error")
+    rest: float = _fmod(x, y)
+    return rest
+
+
+@jit
+def power(x: float, y: float) -> float:
+    """`x ** y` of floats; raises where that is complex or infinite."""
+    z: float = _pow(float(x), float(y))
+    if not math.isfinite(z) and math.isfinite(x) and math.isfinite(y):
+        raise ValueError("math domain error")
+    return z
+
+
+@jit
+def smaller(x: float, y: float) -> float:
+    """`min` of two: the first of two that are equal or not comparable."""
+    return y if y < x else x
+
+
+@jit
+def larger(x: float, y: float) -> float:
+    """`max` of two: the first of two that are equal or not comparable."""
+    return y if y > x else x
+
+
+@jit
+def isfinite(x: float) -> bool:
+    """`math.isfinite`."""
+    return math.isfinite(x)
+
+
+@jit
+def isnan(x: float) -> bool:
+    """`math.isnan`."""
+    return math.isnan(x)
+
+
+@jit
+def radians(x: float) -> float:
+    """`math.radians`."""
+    return x * (math.pi / 180.0)
+
+
+@jit
+def degrees(x: float) -> float:
+    """`math.degrees`."""
+    return x * (180.0 / math.pi)
+
+
+_SPLIT = 134217729.0  # 2^27 + 1
+
+
+@jit
+def _square(x: float) -> tuple[float, float, float]:
+    """The square of x as a sum of three numbers without a rounding error."""
+    t = x * _SPLIT
+    high = t - (t - x)
+    low = x - high
+    return high * high, 2.0 * high * low, low * low
+
+
+@jit
+def _hypot_of_three_parts(x: float, y: float) -> float:
+    """`math.hypot` of Python 3.11: the squares are added to 1 in three parts, and what is lost is kept."""
+    x, y = abs(x), abs(y)
+    most = larger(x, y)
+    if math.isinf(most):
+        return most
+    if math.isnan(x) or math.isnan(y):
+        return math.nan
+    if most == 0.0:
+        return 0.0
+    _, exponent = math.frexp(most)
+    if exponent < -1023:
+        raise ValueError("too small")
+    scale = math.ldexp(1.0, -exponent)
+    total, lost_1, lost_2, lost_3 = 1.0, 0.0, 0.0, 0.0
+    for value in (x, y):
+        first, second, third = _square(value * scale)
+        before = total
+        total += first
+        lost_1 += (before - total) + first
+        before = total
+        total += second
+        lost_2 += (before - total) + second
+        lost_3 += third
+    h = math.sqrt(total - 1.0 + (lost_1 + lost_2 + lost_3))
+    first, second, third = _square(h)
+    before = total
+    total -= first
+    lost_1 += (before - total) - first
+    before = total
+    total -= second
+    lost_2 += (before - total) - second
+    before = total
+    total -= third
+    lost_3 += (before - total) - third
+    return (h + (total - 1.0 + (lost_1 + lost_2 + lost_3)) / (2.0 * h)) / scale
+
+
+@jit
+def _product(x: float, y: float) -> tuple[float, float]:
+    """The product and its rounding error."""
+    t = x * _SPLIT
+    x_high = t - (t - x)
+    x_low = x - x_high
+    t = y * _SPLIT
+    y_high = t - (t - y)
+    y_low = y - y_high
+    z = x * y
+    return z, ((x_high * y_high - z) + x_high * y_low + x_low * y_high) + x_low * y_low
+
+
+@jit
+def _hypot_of_two_parts(x: float, y: float) -> float:
+    """`math.hypot` since Python 3.12: the same with products of two parts."""
+    x, y = abs(x), abs(y)
+    most = larger(x, y)
+    if math.isinf(most):
+        return most
+    if math.isnan(x) or math.isnan(y):
+        return math.nan
+    if most == 0.0:
+        return 0.0
+    _, exponent = math.frexp(most)
+    if exponent < -1023:
+        raise ValueError("too small")
+    scale = math.ldexp(1.0, -exponent)
+    total, lost_1, lost_2 = 1.0, 0.0, 0.0
+    for value in (x, y):
+        high, low = _product(value * scale, value * scale)
+        before = total
+        total += high
+        lost_1 += low
+        lost_2 += high - (total - before)
+    h = math.sqrt(total - 1.0 + (lost_1 + lost_2))
+    high, low = _product(-h, h)
+    before = total
+    total += high
+    lost_1 += low
+    lost_2 += high - (total - before)
+    h += (total - 1.0 + (lost_1 + lost_2)) / (2.0 * h)
+    return h / scale
+
+
+hypot = _hypot_of_two_parts if sys.version_info >= (3, 12) else _hypot_of_three_parts
+
+
+@jit
+def _dot_rounded(row: Any, values: Any) -> float:
+    """`sum` of the products as Python 3.11 adds."""
+    total = 0.0
+    for i in range(len(values)):
+        total += row[i] * values[i]
+    return total
+
+
+@jit
+def _dot_compensated(row: Any, values: Any) -> float:
+    """`sum` of the products as Python adds since 3.12: what is lost is kept and added in the end."""
+    total, lost = 0.0, 0.0
+    for i in range(len(values)):
+        x = row[i] * values[i]
+        t = total + x
+        if abs(total) >= abs(x):
+            lost += (total - t) + x
+        else:
+            lost += (x - t) + total
+        total = t
+    if lost != 0.0 and math.isfinite(lost):
+        return total + lost
+    return total
+
+
+dot = _dot_compensated if sys.version_info >= (3, 12) else _dot_rounded

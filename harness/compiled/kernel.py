@@ -1,0 +1,120 @@
+"""Kernels: lifted loops that Numba has compiled, kept on disk by the content of their text."""
+
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from harness.compiled.lifted import NotLiftedError, Shape, held, module_of
+from harness.files import content_hash, replacing
+from harness.provenance import processor
+
+_HEADER = '''"""Written by the harness: see harness/compiled/kernel.py. {versions}"""
+
+from collections import namedtuple
+
+from numba import njit as jit
+
+from harness.compiled import arithmetic as arithmetic_
+
+'''
+FOLDER = "STANDOFF_HARNESS_CACHE"  # the variable that names the folder of the kernels
+_KEPT = 100  # modules
+
+
+class NotCompiledError(Exception):
+    """The flight cannot be compiled; the message says why."""
+
+
+@cache
+def is_installed() -> bool:
+    """Whether there is a Numba."""
+    return importlib.util.find_spec("numba") is not None
+
+
+_KERNELS: dict[Shape, Callable[..., Any] | str] = {}  # by the shape of what the loop holds; or why there is none
+
+
+def kernel(function: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+    """A function compiled, and what it is called with as its last argument. Raises `NotCompiledError`."""
+    try:
+        shape, numbers = held(function)
+    except NotLiftedError as error:
+        raise NotCompiledError(str(error)) from None
+    if shape not in _KERNELS:
+        try:
+            _KERNELS[shape] = _loaded(function)
+        except NotLiftedError as error:
+            _KERNELS[shape] = str(error)
+    found = _KERNELS[shape]
+    if isinstance(found, str):
+        raise NotCompiledError(found)
+    return found, numbers
+
+
+def refuse(function: Any, why: str) -> None:
+    """The kernel of this function is not used any more."""
+    _KERNELS[held(function)[0]] = why
+
+
+def _loaded(function: Any) -> Callable[..., Any]:
+    """The function of a module that is written, if there is none with this text, and imported."""
+    import llvmlite
+    import numba
+
+    body, name = module_of(function)
+    arithmetic = content_hash((Path(__file__).parent / "arithmetic.py").read_bytes())
+    versions = f"{sys.version_info[:3]}, {numba.__version__}, {llvmlite.__version__}, {processor()}, {arithmetic}"
+    text = f"{_HEADER.format(versions=versions)}{body}\n{name} = jit(cache=True)({name}.py_func)\n"
+    file = folder() / f"kernel_{content_hash(text.encode())}.py"
+    if not file.exists():
+        with replacing(file) as partial:
+            partial.write_text(text, encoding="utf-8")
+            os.utime(partial, (0, 0))  # the same in every process: Numba compiles anew what has another time
+        _clear(file.parent)
+    found: Callable[..., Any] = getattr(_imported(file), name)
+    return found
+
+
+def _imported(file: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"standoff_harness_{file.stem}", file)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module.__name__] = module
+    earlier, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.dont_write_bytecode = earlier
+    return module
+
+
+@cache
+def folder() -> Path:
+    """The folder of the kernels: the user's cache, or one of this user's own among the temporary files."""
+    caches = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
+    path = Path(os.environ.get(FOLDER) or Path(caches) / "standoff-harness" / "kernels")
+    with suppress(OSError):
+        path.mkdir(parents=True, exist_ok=True)
+        if os.access(path, os.W_OK):
+            return path
+    path = Path(tempfile.gettempdir()) / f"standoff-harness-{os.getuid()}"
+    path.mkdir(mode=0o700, exist_ok=True)
+    if path.stat().st_uid != os.getuid():
+        raise NotCompiledError(f"{path} is somebody else's: name a folder in {FOLDER}")
+    return path
+
+
+def _clear(folder: Path) -> None:
+    """Keeps the latest modules alone, with what Numba made of them."""
+    by_age = sorted(folder.glob("kernel_*.py"), key=lambda file: file.stat().st_ctime_ns)
+    for old in by_age[:-_KEPT]:
+        for file in [old, *(folder / "__pycache__").glob(f"{old.stem}.*")]:
+            file.unlink(missing_ok=True)

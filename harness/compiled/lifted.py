@@ -1,0 +1,440 @@
+"""A closure of pure functions, lifted into a module that Numba compiles and into the numbers that the closure holds.
+
+A law in flight is a function within functions: it holds gains, and other functions that hold theirs. In the lifted
+module each of them stands at the top and gets what it held as one more argument, a tuple. So laws that differ in
+numbers alone share one module. The text of each function is that of its own file, unchanged but for this, and for
+arithmetic that the compiler would do otherwise (`arithmetic`).
+"""
+
+import ast
+import builtins
+import copy
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from pathlib import Path
+from types import CodeType, FunctionType, MethodType, ModuleType
+from typing import Any, NamedTuple, cast
+
+from autopilot.guidance import Telling
+from autopilot.response import dot
+
+Shape = tuple[Any, ...]  # of what a function holds: its code, then for each name what kind of thing it is
+_NUMBERS = (float, int, bool)
+_BUILTINS = {"abs", "len", "range", "float", "int", "bool", "enumerate", "zip"}
+_ARITHMETIC = {
+    getattr(math, name): name
+    for name in (
+        "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "expm1", "log1p", "sqrt", "atan2",
+        "copysign", "remainder", "fmod", "hypot", "isfinite", "isnan", "radians", "degrees",
+    )
+} | {math.pow: "power", dot: "dot"}  # fmt: skip
+_REFUSED = {
+    ast.Nonlocal: "it keeps a variable from one call to the next",
+    ast.Global: "it changes a variable of its module",
+    ast.FunctionDef: "it defines a function within",
+    ast.Lambda: "it defines a function within",
+    ast.GeneratorExp: "it has a generator within",
+    ast.Yield: "it is a generator",
+    ast.Try: "it catches errors",
+    ast.With: "it has a context manager",
+}
+
+
+class NotLiftedError(Exception):
+    """The function cannot be lifted; the message says why."""
+
+
+class _Function(NamedTuple):
+    """A function and what it holds by name: the cells of its closure, and the object of a method."""
+
+    function: Any
+    held: Mapping[str, Any]
+
+
+def _parts(function: Any) -> _Function:
+    if isinstance(function, MethodType) and isinstance(function.__func__, FunctionType):
+        inner = _parts(function.__func__)
+        return _Function(inner.function, {inner.function.__code__.co_varnames[0]: function.__self__, **inner.held})
+    if not isinstance(function, FunctionType):
+        raise NotLiftedError(f"{function!r} is no function of Python")
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    return _Function(function, {name: cell.cell_contents for name, cell in cells})
+
+
+def held(function: Any) -> tuple[Shape, tuple[Any, ...]]:
+    """The shape of what a function holds, and the numbers in it. Raises `NotLiftedError`."""
+    of, kept = _parts(function)
+    shape, values = [], []
+    for name, value in kept.items():
+        kind, numbers = _kind(name, value)
+        shape.append((name, *kind))
+        if numbers is not None:
+            values.append(numbers)
+    return (of.__code__, *shape), tuple(values)
+
+
+def _kind(name: str, value: Any) -> tuple[tuple[Any, ...], Any]:
+    """What kind of thing a function holds, and the numbers in it; None without."""
+    kind = type(value)
+    if kind in _NUMBERS:
+        return ("number", kind), value
+    if value is None or kind is str:
+        return ("constant", value), None
+    if kind is FunctionType or kind is MethodType:
+        shape, numbers = held(value)
+        return ("function", shape), numbers or None
+    if kind is tuple and value and all(type(x) is float for x in value):
+        return ("tuple", len(value)), value
+    if _is_record(kind) and all(type(x) in _NUMBERS for x in value):
+        return ("record", kind.__name__, kind._fields), tuple(value)
+    if is_dataclass(value) and kind.__dataclass_params__.frozen:
+        own = {f.name: getattr(value, f.name) for f in fields(value) if type(getattr(value, f.name)) in _NUMBERS}
+        return ("record", kind.__name__, tuple(own)), tuple(own.values())
+    if callable(value) or isinstance(value, ModuleType):
+        return ("constant", value), None
+    raise NotLiftedError(f"it holds {name}, which is {kind.__name__}")
+
+
+def module_of(function: Any) -> tuple[str, str]:
+    """The text of the lifted module, without its first lines, and the name of the function in it."""
+    lifting = _Lifting()
+    name = lifting.function(function)
+    return "\n\n".join(lifting.texts) + "\n", name
+
+
+class _Lifting:
+    """A module in the making."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+        self._names: dict[Shape, str] = {}
+
+    def function(self, function: Any) -> str:
+        """The name in the module of a function."""
+        shape, _ = held(function)
+        if shape not in self._names:
+            of = _parts(function)
+            node = _node(of.function.__code__)
+            name = self._names[shape] = f"f{len(self._names)}_{_plain(of.function.__name__)}"
+            self.texts.append(_Writer(self, of, node, shape).text(name))
+        return self._names[shape]
+
+    def record(self, name: str, names: tuple[str, ...]) -> str:
+        """The name in the module of a named tuple."""
+        key = ("record", name, names)
+        if key not in self._names:
+            self._names[key] = f"r{len(self._names)}_{_plain(name)}"
+            self.texts.append(f"{self._names[key]} = namedtuple({name!r}, {list(names)!r})")
+        return self._names[key]
+
+
+class _Writer(ast.NodeTransformer):
+    """Writes one function of the module."""
+
+    def __init__(self, lifting: _Lifting, of: _Function, node: ast.FunctionDef | ast.Lambda, shape: Shape) -> None:
+        self._lifting, self._of, self._node = lifting, of, copy.deepcopy(node)
+        self._kinds = {name: tuple(kind) for name, *kind in shape[1:]}
+        code = of.function.__code__
+        self._local = {*code.co_varnames, *code.co_cellvars} - set(self._kinds)
+        for each in ast.walk(self._node):
+            if isinstance(each, ast.comprehension):
+                self._local |= {one.id for one in ast.walk(each.target) if isinstance(one, ast.Name)}
+        self._records = {}  # the named tuple that a parameter is annotated with, by its name
+        for argument in self._node.args.args:
+            of_type = self._looked_up(argument.annotation)
+            if _is_record(of_type):
+                self._records[argument.arg] = of_type
+
+    def text(self, name: str) -> str:
+        """The function's text. Raises `NotLiftedError`."""
+        node, arguments = self._node, self._node.args
+        if arguments.vararg or arguments.kwarg or arguments.kwonlyargs or arguments.defaults:
+            raise NotLiftedError(f"{self._of.function.__name__} has other arguments than plain ones")
+        body: list[ast.stmt] = [ast.Return(node.body)] if isinstance(node, ast.Lambda) else node.body
+        for statement in body:
+            for inner in ast.walk(statement):
+                if why := _REFUSED.get(type(inner)):
+                    raise NotLiftedError(f"{self._of.function.__name__}: {why}")
+        names = [a.arg for a in [*arguments.posonlyargs, *arguments.args] if a.arg not in self._kinds]
+        lines: list[str] = []
+        if kept := self._kept():
+            names.append("held_")
+            lines.append(f"    ({', '.join(kept)},) = held_")
+        for each, kind in self._kinds.items():
+            if kind[0] == "record":
+                lines.append(f"    {each} = {self._lifting.record(kind[1], kind[2])}(*{each}_)")
+        for statement in body:
+            made = self.visit(statement)
+            for one in made if isinstance(made, list) else [made] if made else []:
+                text = ast.unparse(ast.fix_missing_locations(one))
+                lines += [f"    {line}" for line in text.splitlines()]
+        return f"@jit\ndef {name}({', '.join(names)}):\n" + "\n".join(lines or ["    pass"])
+
+    def _kept(self) -> list[str]:
+        """The names of the values in `held_`, in their order."""
+        names = []
+        for name, kind in self._kinds.items():
+            if kind[0] in ("number", "tuple"):
+                names.append(name)
+            elif kind[0] == "record" or (kind[0] == "function" and self._needs(kind[1])):
+                names.append(f"{name}_")
+        return names
+
+    @staticmethod
+    def _needs(shape: Shape) -> bool:
+        """Whether a function of this shape holds any number."""
+        return any(
+            k[0] in ("number", "tuple", "record") or (k[0] == "function" and _Writer._needs(k[1]))
+            for _, *k in shape[1:]
+        )
+
+    # what names stand for
+
+    def _looked_up(self, node: ast.expr | None) -> Any:
+        """The object that an expression means before the flight; `_UNKNOWN` for one of the flight."""
+        if isinstance(node, ast.Name):
+            if node.id in self._local:
+                return _UNKNOWN
+            if node.id in self._kinds:
+                return self._of.held[node.id]
+            space = self._of.function.__globals__
+            return space.get(node.id, getattr(builtins, node.id, _UNKNOWN))
+        if isinstance(node, ast.Attribute):
+            owner = self._looked_up(node.value)
+            if isinstance(owner, ModuleType | type):
+                return getattr(owner, node.attr, _UNKNOWN)
+        return _UNKNOWN
+
+    def _constant(self, value: Any) -> ast.expr:
+        """What stands in the module for an object that is known before the flight."""
+        if value is None or isinstance(value, str | bool | int):
+            return ast.Constant(value)
+        if isinstance(value, float):
+            return (
+                ast.Constant(value)
+                if math.isfinite(value)
+                else _arithmetic({math.inf: "inf", -math.inf: "minus_inf"}.get(value, "nan"))
+            )
+        if isinstance(value, tuple) and not _is_record(type(value)):
+            return ast.Tuple([self._constant(x) for x in value], ast.Load())
+        if _is_record(value):
+            return _name(self._lifting.record(value.__name__, value._fields))
+        if value in _ARITHMETIC:
+            return _arithmetic(_ARITHMETIC[value])
+        if isinstance(value, FunctionType) and not self._needs(held(value)[0]):
+            return _name(self._lifting.function(value))
+        name = getattr(value, "__name__", "")
+        is_error = isinstance(value, type) and issubclass(value, BaseException)
+        if getattr(builtins, name, None) is value and (name in _BUILTINS or is_error):
+            return _name(name)
+        raise NotLiftedError(f"{self._of.function.__name__} uses {getattr(value, '__name__', value)!r}")
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self._local or not isinstance(node.ctx, ast.Load):
+            return node
+        if node.id in self._kinds and self._kinds[node.id][0] != "constant":
+            if self._kinds[node.id][0] == "function":
+                raise NotLiftedError(f"{self._of.function.__name__} hands on the function {node.id}")
+            return node
+        return self._constant(self._known(node))
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        if (value := self._looked_up(node)) is not _UNKNOWN:
+            return self._constant(value)
+        self.generic_visit(node)
+        return node
+
+    def _known(self, node: ast.Name) -> Any:
+        value = self._looked_up(node)
+        if value is _UNKNOWN:
+            raise NotLiftedError(f"{self._of.function.__name__} uses {node.id}")
+        return value
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        called = node.func
+        if isinstance(called, ast.Attribute) and called.attr == "_replace" and isinstance(called.value, ast.Name):
+            return self._replaced(called.value, node)
+        what = self._looked_up(called)
+        if what is isinstance and self._looked_up(node.args[1]) is Telling:
+            return ast.Constant(False)  # a law that tells channels of its own is not lifted
+        if what in (min, max) and len(node.args) > 1 and not node.keywords:
+            name = "smaller" if what is min else "larger"
+            first, *rest = [self.visit(argument) for argument in node.args]
+            for each in rest:
+                first = ast.Call(_arithmetic(name), [first, each], [])
+            return cast(ast.expr, first)
+        if record := _is_made(what):
+            (of,) = node.args
+            values: list[ast.expr] = of.elts if isinstance(of, ast.Tuple) else [ast.Starred(of, ast.Load())]
+            return self._record(record, values, [])
+        if _is_record(what):
+            return self._record(what, node.args, node.keywords)
+        if node.keywords:
+            raise NotLiftedError(f"{self._of.function.__name__} names arguments in a call")
+        arguments = [self.visit(argument) for argument in node.args]
+        if isinstance(called, ast.Name) and self._kinds.get(called.id, ("",))[0] == "function":
+            if self._needs(self._kinds[called.id][1]):
+                arguments.append(_name(f"{called.id}_"))
+            return ast.Call(_name(self._lifting.function(self._of.held[called.id])), arguments, [])
+        return ast.Call(self.visit(called), arguments, [])
+
+    def _record(self, record: Any, values: list[ast.expr], named: list[ast.keyword]) -> ast.expr:
+        """A named tuple, with its defaults written out."""
+        name = _name(self._lifting.record(record.__name__, record._fields))
+        made = [self.visit(value) for value in values]
+        if any(isinstance(value, ast.Starred) for value in made):
+            return ast.Call(name, made, [])
+        by_name = {one.arg: self.visit(one.value) for one in named}
+        for field in record._fields[len(made) :]:
+            if field not in by_name and field not in record._field_defaults:
+                raise NotLiftedError(f"{self._of.function.__name__} leaves out {field} of {record.__name__}")
+            made.append(by_name[field] if field in by_name else self._constant(record._field_defaults[field]))
+        return ast.Call(name, made, [])
+
+    def _replaced(self, what: ast.Name, node: ast.Call) -> ast.expr:
+        """`_replace` of a parameter that is annotated with its named tuple."""
+        if what.id not in self._records:
+            raise NotLiftedError(f"{self._of.function.__name__}: what {what.id} is, is not annotated")
+        record = self._records[what.id]
+        new = {one.arg: one.value for one in node.keywords}
+        values = [new.get(f, ast.Attribute(what, f, ast.Load())) for f in record._fields]
+        return self._record(record, values, [])
+
+    # what is written otherwise
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Pow):
+            return ast.Call(_arithmetic("power"), [node.left, node.right], [])
+        return node
+
+    def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
+        self.generic_visit(node)
+        if not any(isinstance(one, ast.Starred) for one in node.elts) or not isinstance(node.ctx, ast.Load):
+            return node
+        parts: list[ast.expr] = []
+        for one in node.elts:
+            if isinstance(one, ast.Starred):
+                parts.append(one.value)
+            elif parts and isinstance(parts[-1], ast.Tuple):
+                parts[-1].elts.append(one)
+            else:
+                parts.append(ast.Tuple([one], ast.Load()))
+        first, *rest = parts
+        for part in rest:
+            first = ast.BinOp(first, ast.Add(), part)
+        return first
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt | None:
+        return ast.Assign([node.target], self.visit(node.value)) if node.value else None
+
+    def visit_If(self, node: ast.If) -> Any:
+        test = self._test(node.test)
+        if isinstance(test, ast.Constant):
+            return [made for one in (node.body if test.value else node.orelse) for made in _listed(self.visit(one))]
+        node.test = test
+        node.body = [made for one in node.body for made in _listed(self.visit(one))] or [ast.Pass()]
+        node.orelse = [made for one in node.orelse for made in _listed(self.visit(one))]
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        test = self._test(node.test)
+        if isinstance(test, ast.Constant):
+            chosen: ast.expr = self.visit(node.body if test.value else node.orelse)
+            return chosen
+        return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
+
+    def _test(self, node: ast.expr) -> ast.expr:
+        """A condition; a constant where it is known before the flight."""
+        if isinstance(node, ast.Name) and self._kinds.get(node.id, ("",))[0] == "function":
+            return ast.Constant(True)
+        made: ast.expr = self.visit(node)
+        return made
+
+    def visit_Expr(self, node: ast.Expr) -> ast.stmt | None:
+        if isinstance(node.value, ast.Constant):
+            return None  # a docstring
+        self.generic_visit(node)
+        return node
+
+
+class _Unknown:
+    """Stands for what is not known before the flight."""
+
+    __hash__ = object.__hash__
+
+
+_UNKNOWN = _Unknown()
+
+
+def _listed(made: Any) -> list[Any]:
+    return made if isinstance(made, list) else [made] if made is not None else []
+
+
+def _name(name: str) -> ast.Name:
+    return ast.Name(name, ast.Load())
+
+
+def _arithmetic(name: str) -> ast.Attribute:
+    return ast.Attribute(_name("arithmetic_"), name, ast.Load())
+
+
+def _plain(name: str) -> str:
+    return name if name.isidentifier() else "lambda_"
+
+
+def _is_record(value: Any) -> bool:
+    """Whether it is the class of a named tuple."""
+    return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
+
+
+def _is_made(value: Any) -> Any:
+    """The named tuple whose `_make` it is, or None."""
+    owner = getattr(value, "__self__", None)
+    return owner if getattr(value, "__name__", "") == "_make" and _is_record(owner) else None
+
+
+def _node(code: CodeType) -> ast.FunctionDef | ast.Lambda:
+    """The function of this code in its file. Raises `NotLiftedError` where the file has changed since."""
+    try:
+        tree, codes = _read(code.co_filename, Path(code.co_filename).stat().st_mtime_ns)
+    except (OSError, SyntaxError, ValueError) as error:
+        raise NotLiftedError(f"{code.co_filename}: {error}") from None
+    if code not in codes:
+        raise NotLiftedError(f"{code.co_filename} has changed since it was loaded")
+    begin = min((line, column) for line, _, column, _ in _positions(code))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name == code.co_name:
+            if min(node.lineno, *(n.lineno for n in node.decorator_list), node.lineno) == code.co_firstlineno:
+                return node
+        elif isinstance(node, ast.Lambda) and code.co_name == "<lambda>":
+            body = node.body
+            if (body.lineno, body.col_offset) <= begin <= (body.end_lineno or 0, body.end_col_offset or 0):
+                return node
+    raise NotLiftedError(f"{code.co_name} is not found in {code.co_filename}")
+
+
+def _positions(code: CodeType) -> Iterator[tuple[int, int, int, int]]:
+    """Where the instructions of a code stand."""
+    for line, end_line, column, end_column in code.co_positions():
+        if line and end_line and column is not None and end_column:
+            yield line, end_line, column, end_column
+
+
+@lru_cache(maxsize=64)
+def _read(file: str, changed: int) -> tuple[ast.Module, frozenset[CodeType]]:
+    """A file as it is now: its tree, and all codes in it."""
+    text = Path(file).read_bytes()
+    return ast.parse(text, file), frozenset(_codes(compile(text, file, "exec")))
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for inner in code.co_consts:
+        if isinstance(inner, CodeType):
+            yield from _codes(inner)
+
+
+Lifted = Callable[..., Any]

@@ -1,0 +1,111 @@
+"""The loop of a compiled flight: that of `harness.loop` over what is known before the flight, row by row.
+
+Law and plant are the functions that fly elsewhere; what stands here is lifted and compiled together with them.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from autopilot.guidance import LawStep, Observation
+from autopilot.response import Piece
+from harness.knowledge import heading_in, turned
+from harness.log import LOOP_COLUMNS
+from harness.plants.level import Motion, Move, States, carried, level_state
+from harness.plants.state import State
+from harness.world.target import TargetState
+
+COMPLETED, TARGET_LOST, UNUSUAL = 0, 1, 2  # how the loop ended; unusual: the flight is left to Python
+_TARGET = 1 + len(State._fields)  # the first column of the target
+_GUIDANCE = _TARGET + len(TargetState._fields)
+assert len(LOOP_COLUMNS) == _GUIDANCE + 6
+
+Step = Callable[[Motion, States, float, float, int, Any], tuple[Motion, States]]
+
+
+def at_once(move: Move) -> Step:
+    """A plant without memory."""
+
+    def step(now: Motion, states: States, rate: float, period: float, k: int, line: Any) -> tuple[Motion, States]:
+        return move(now, rate, period), states
+
+    return step
+
+
+def in_pieces(
+    commanded: Callable[[float], float],
+    piece: Callable[[Motion, States, float, Piece], tuple[Motion, States]],
+    ended: Callable[[Motion, States, float, float], Motion],
+) -> Step:
+    """A plant behind a delay: `line` says which pieces each period has, and which command acts in each."""
+
+    def step(now: Motion, states: States, rate: float, period: float, k: int, line: Any) -> tuple[Motion, States]:
+        given_so_far, begins, sources, kinds, lengths, outputs, integrals, ends, airspeeds = line
+        given = commanded(rate)
+        given_so_far[k] = given
+        acts = 0.0
+        for i in range(begins[k], begins[k + 1]):
+            acts = given_so_far[sources[i]] if sources[i] >= 0 else 0.0
+            p = kinds[i]
+            rows = Piece(lengths[p], outputs[p], integrals[p], ends[p], airspeeds[p])
+            now, states = piece(now, states, acts, rows)
+        return ended(now, states, acts, given), states
+
+    return step
+
+
+def flown(law: LawStep, step: Step) -> Callable[..., Any]:
+    """The loop with this law and this plant."""
+
+    def fly(
+        table: Any, target: Any, estimate: Any, air: Any, drift: Any, noise: Any, line: Any, rows: Any, fixed: Any,
+        now: Any, states: States,
+    ) -> Any:  # fmt: skip
+        """Fills the rows of the table from `first` on, until `end`; a flight ends with the row `last`.
+
+        Returns how it ended, the number of rows that are filled, and from what it goes on.
+        """
+        first, end, last = rows
+        period, altitude, nominal_airspeed, W_x, W_y, scale, monitoring_range = fixed
+        x, y, v_a, psi, rate, bank, roll_rate, bank_command = now
+        moved = Motion(x, y, v_a, psi, rate, bank, roll_rate, bank_command)
+        for k in range(first, end):
+            time = k * period
+            state = level_state(moved, altitude, air[k, 0], air[k, 1], air[k, 2])
+            v_a, psi, v_x, v_y = state.airspeed, state.heading, state.velocity_north, state.velocity_east
+            if scale != 1.0:
+                v_a = scale * v_a
+            if len(noise):
+                v_x, v_y = turned(v_x, v_y, noise[k])
+                psi = heading_in((W_x, W_y), v_x, v_y)
+            if state.wind_north != W_x or state.wind_east != W_y:
+                psi = heading_in((W_x, W_y), v_x, v_y)
+            seen = Observation(
+                state.north, state.east, v_x, v_y, v_a, psi, state.heading_rate, state.bank, state.roll_rate,
+                nominal_airspeed, W_x, W_y, estimate[k, 0], estimate[k, 1], estimate[k, 2], estimate[k, 3],
+                estimate[k, 4], estimate[k, 5], time,
+            )  # fmt: skip
+            guidance = law(seen)
+            if not math.isfinite(guidance.heading_rate):
+                return UNUSUAL, k, now, states
+            table[k, 0] = time
+            for i in range(len(state)):
+                table[k, 1 + i] = state[i]
+            for i in range(6):
+                table[k, _TARGET + i] = target[k, i]
+            table[k, _GUIDANCE] = guidance.heading_rate
+            table[k, _GUIDANCE + 1] = guidance.range_error
+            table[k, _GUIDANCE + 2] = guidance.sliding_variable
+            table[k, _GUIDANCE + 3] = guidance.heading_error
+            table[k, _GUIDANCE + 4] = guidance.feed_forward
+            table[k, _GUIDANCE + 5] = guidance.unlimited_command
+            if math.hypot(state.north - target[k, 0], state.east - target[k, 1]) > monitoring_range:
+                return TARGET_LOST, k + 1, now, states
+            if k < last:
+                moved, states = step(moved, states, guidance.heading_rate, period, k, line)
+                moved = carried(moved, drift[k, 0], drift[k, 1])
+                x, y, v_a, psi, rate, bank, roll_rate, bank_command = moved
+                now = (x, y, v_a, psi, rate, bank, roll_rate, bank_command)
+        return COMPLETED, end, now, states
+
+    return fly

@@ -1,0 +1,58 @@
+"""Which engine flies the flights of a run: Python, or compiled loops where that can be and is worth it."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from harness.compiled.engine import why_plain
+from harness.compiled.kernel import is_installed
+from harness.error import HarnessError
+from harness.flight import Flight
+from harness.plants.ladder import PLANTS
+from harness.runs.survey import Survey
+from harness.settings.laws import kind_of_class, short, source_of
+
+ENGINES = ("python", "compiled")
+WORTH = 20.0  # s that the flights take in Python, in one process: a loop is compiled in some seconds
+
+
+class EngineError(HarnessError):
+    """The flights cannot be flown by the engine that is asked for; the message says why."""
+
+
+class Engine(NamedTuple):
+    """The engine of a run."""
+
+    compiled: bool  # where a flight can be compiled
+    notes: tuple[str, ...] = ()  # on the laws of one's own that Python flies
+
+
+def engine_for(size: Survey, asked: str | None, times: float = 1.0) -> Engine:
+    """The engine that is asked for, or else the one that is quicker; `times`: how often the flights are flown.
+
+    What is compiled now the workers find on the disk. Raises `EngineError`.
+    """
+    if asked == "python" or not size.flights:
+        return Engine(False)
+    if asked is None and not (is_installed() and times * _plain(size.typical) >= WORTH):
+        return Engine(False)
+    compiled, notes = False, []
+    for flight in size.examples.values():
+        if asked is None and PLANTS[flight.plant].has_body:
+            continue
+        why = why_plain(flight)
+        if why and asked:
+            raise EngineError(f"--engine compiled: {_named(flight)} on {flight.plant}: {why}")
+        if why and source_of(flight.law):
+            notes.append(f"{_named(flight)} on {flight.plant} is not compiled: {why}")
+        compiled |= not why
+    return Engine(compiled, tuple(notes) if compiled or asked is None else ())
+
+
+def _plain(typical: Mapping[str, float]) -> float:
+    """The time that flights take in Python which a compiled loop may save, s."""
+    return sum(seconds for plant, seconds in typical.items() if not PLANTS[plant].has_body)
+
+
+def _named(flight: Flight) -> str:
+    known = kind_of_class(type(flight.law))
+    return f"the law {short(known[0]) if known else type(flight.law).__name__}"

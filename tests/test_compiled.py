@@ -1,0 +1,246 @@
+"""Compiled flights: the same bits as Python's, the reasons for which a flight is left to Python, and the choice."""
+
+import math
+import random
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import harness
+from autopilot.guidance import UNKNOWN, started
+from autopilot.laws import law
+from harness import loop
+from harness.compiled import arithmetic, engine
+from harness.compiled.lifted import NotLiftedError, module_of
+from harness.flight import Flight, MetricSettings
+from harness.flight_errors import Errors
+from harness.log import FlightLog
+from harness.plants.plant import Outcome, Start
+from harness.world.target import Segment, Target
+from harness.world.wind import Gust, Wind
+from tests.builders import EXPERIMENTS, FLIGHT, OwnLaw, digests, invoke, turning, write
+
+# (plant, law, direction, airspeed, limited quantity): each is compiled once, which takes some seconds
+KINDS = (
+    ("kinematic", "nftsm", "paper", "ground"),
+    ("kinematic", "orbit_field", "paper", "nominal"),
+    ("kinematic", "npfg", "mirrored", "measured"),
+    ("lagged", "nftsm", "paper", "ground"),
+    ("coordinated", "smc", "mirrored", "ground"),
+)
+AIRSPEEDS = {"ultra_stick_25e": 13.0, "skywalker_x8": 13.0, "aerosonde": 25.0}
+
+
+def anywhere(seed: int) -> Flight:
+    """A random flight: law, gains, start, wind, gusts, target, period, errors of what is known."""
+    draw = random.Random(seed)
+    plant, name, direction, airspeed = KINDS[seed % len(KINDS)]
+    aircraft = draw.choice(list(AIRSPEEDS))
+    v_a = AIRSPEEDS[aircraft]
+    gains: dict[str, Any] = {"k2": draw.uniform(0.5, 15.0), "k3": draw.uniform(0.0, 8.0)} if name == "nftsm" else {}
+    own = law(
+        name, standoff=draw.uniform(80.0, 400.0), max_heading_rate=math.radians(draw.uniform(3.0, 20.0)),
+        direction=direction, airspeed=airspeed, command=draw.choice(["heading_rate", "course_rate"]), **gains,
+    )  # fmt: skip
+    wind = Wind(steady=(draw.uniform(-5.0, 5.0), draw.uniform(-5.0, 5.0))) if draw.random() < 0.7 else Wind()
+    if draw.random() < 0.2:
+        wind = replace(wind, gusts=(Gust(from_=1.0, to=5.0, velocity=(2.0, -3.0, 1.0)),))
+    if draw.random() < 0.1:
+        wind = replace(wind, turbulence="moderate")
+    target = Target(position=(draw.uniform(-50.0, 50.0), draw.uniform(-50.0, 50.0)))
+    if draw.random() < 0.4:
+        segment = Segment(from_=2.0, to=8.0, acceleration=draw.uniform(0.0, 0.3), turn_rate=draw.uniform(-0.1, 0.1))
+        target = replace(target, speed=draw.uniform(0.0, 4.0), heading=draw.uniform(-3.0, 3.0), segments=(segment,))
+    errors = Errors(wind=draw.choice([0.0, 0.5]), course_noise=draw.choice([0.0, 0.01]), airspeed_scale=1.0)
+    estimator = replace(FLIGHT.estimator, turn_rate=draw.choice(["known", "unknown"]))
+    position = (draw.uniform(-600.0, 600.0), draw.uniform(-600.0, 600.0))
+    return Flight(
+        plant=plant, law=own, aircraft=aircraft, duration=draw.choice([5.0, 10.0, 20.0]), seed=seed,
+        guidance_period=draw.choice([0.05, 0.1, 0.25]), wind=wind, target=target, errors=errors, estimator=estimator,
+        start=Start(position=position, heading=draw.uniform(-3.1, 3.1), airspeed=v_a),
+        metrics=MetricSettings(monitoring_range=draw.choice([None, None, 700.0])),
+    )  # fmt: skip
+
+
+def compiled(flight: Flight) -> FlightLog:
+    """The flight by a kernel: not once by Python."""
+    return engine._trusted(flight, None)
+
+
+def test_500_random_flights_have_the_same_digests_and_tables_compiled_as_in_python() -> None:
+    outcomes = set()
+    for seed in range(500):
+        flight = anywhere(seed)
+        plain, quick = loop.simulate(flight), compiled(flight)
+        assert quick.digest == plain.digest, flight
+        assert quick.reason == plain.reason
+        assert np.array_equal(quick.table, plain.table, equal_nan=True), flight
+        outcomes.add(plain.outcome)
+    assert outcomes >= {Outcome.COMPLETED, Outcome.TARGET_LOST}
+
+
+TWO = ("atan2", "copysign", "remainder", "fmod", "hypot", "power")
+ONE = ("sin", "cos", "tan", "asin", "atan", "exp", "log1p", "sqrt", "radians")
+
+
+@pytest.mark.parametrize("name", [*ONE, *TWO])
+def test_compiled_arithmetic_has_the_bits_of_python_and_raises_where_python_does(name: str) -> None:
+    draw = random.Random(name)
+    python: Callable[..., Any] = pow if name == "power" else getattr(math, name)
+
+    def number() -> float:
+        return draw.choice([1.0, -1.0, 0.0]) * math.exp(draw.uniform(-14.0, 14.0))
+
+    def outcome(function: Callable[..., Any], *arguments: float) -> object:
+        try:
+            made = function(*arguments)
+        except (ValueError, ArithmeticError):
+            return "raises"
+        return "raises" if isinstance(made, complex) else made
+
+    for _ in range(5000):
+        arguments = [number() for _ in range(2 if name in TWO else 1)]
+        if name == "power" and draw.random() < 0.5:
+            arguments[1] = 2.0  # which a compiler knows as a product
+        made = outcome(getattr(arithmetic, name), *arguments)
+        assert made == outcome(python, *arguments), arguments
+
+
+OWN = '''
+from dataclasses import dataclass
+from math import hypot
+
+from autopilot.guidance import Guidance
+
+
+@dataclass(frozen=True)
+class Own:
+    """Turns left when it is too far from the target."""
+
+    standoff: float = 200.0
+    max_heading_rate: float = 0.1
+    command = "heading_rate"
+    gain: float = 0.001
+    broken: bool = False
+
+    def start(self):
+        turns = 0
+
+        def step(o):
+            {memory}
+            r = hypot(o.north - o.target_north, o.east - o.target_east) - self.standoff
+            if self.broken and o.time > 1.0:
+                raise ValueError("it is broken")
+            rate = max(-self.max_heading_rate, min(self.max_heading_rate, -self.gain * r))
+            return Guidance(rate, r, 0.0, 0.0, 0.0, rate)
+
+        return step
+
+    def broken_conditions(self, speed_ratio):
+        return []
+'''
+MATRIX = """
+[flight]
+plant = "kinematic"
+duration_s = 20.0
+law.name = "own.py:Own"
+[matrix]
+"law.gain" = [0.001, 0.002]
+"law.broken" = [false, true]
+"""
+
+
+def own(folder: Path, memory: str = "") -> Path:
+    """A matrix of flights of a law of one's own."""
+    write(folder / "own.py", OWN.replace("{memory}", memory))
+    return write(folder / "own.toml", MATRIX)
+
+
+def test_both_engines_make_the_same_rows_with_a_law_of_ones_own_whatever_it_raises(tmp_path: Path) -> None:
+    tables = []
+    for name in ("python", "compiled"):
+        ran = invoke("run", own(tmp_path), "--out", tmp_path / name, "--workers", 2, "--log", "none", "--engine", name)
+        assert "4 flown, 0 earlier, 2 failed" in ran.output
+        tables.append(harness.load_results(tmp_path / name).set_index("key").drop(columns="seconds").sort_index())
+    assert tables[0].equals(tables[1])
+    assert {"", "the law raised ValueError: it is broken"} == set(tables[0]["reason"])
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        (["plant=sixdof"], "on sixdof: the plant sixdof has no closed form"),
+        (["errors.command_delay_s=0.1"], "on kinematic: errors.command_delay_s delays the command"),
+        (["law.name=lq_orbit", "law.gains=slow"], "the law lq_orbit on kinematic: it holds "),
+    ],
+)
+def test_a_flight_that_cannot_be_compiled_is_refused_where_that_is_asked(
+    tmp_path: Path, settings: list[str], why: str
+) -> None:
+    words = [word for setting in ("plant=kinematic", *settings) for word in ("--set", setting)]
+    ran = invoke("run", EXPERIMENTS / "stationary.toml", "--out", tmp_path, *words, "--engine", "compiled")
+    assert ran.exit_code == 2
+    assert why in ran.output.splitlines()[-1], ran.output
+
+
+def test_a_law_with_a_memory_is_flown_by_python_which_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.runs.engine.WORTH", 0.0)
+    file = own(tmp_path, "nonlocal turns; turns += 1")
+    ran = invoke("run", file, "--out", tmp_path / "out", "--workers", 0, "--log", "none", "--set", "law.broken=false")
+    assert ran.exit_code == 0, ran.output
+    assert ran.output.count("it keeps a variable from one call to the next") == 1
+
+
+def test_a_short_run_and_an_installation_without_numba_are_flown_by_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(flight: Flight, watch: object) -> FlightLog:
+        raise AssertionError("compiled")
+
+    monkeypatch.setattr(engine, "_trusted", refused)
+    assert invoke("run", own(tmp_path), "--out", tmp_path / "short", "--workers", 0, "--log", "none").exit_code == 1
+    monkeypatch.setattr("harness.runs.engine.WORTH", 0.0)
+    monkeypatch.setattr("harness.runs.engine.is_installed", lambda: False)
+    assert invoke("run", own(tmp_path), "--out", tmp_path / "none", "--workers", 0, "--log", "none").exit_code == 1
+    assert digests(tmp_path / "short") == digests(tmp_path / "none")
+
+
+def test_a_law_whose_file_has_changed_since_it_was_loaded_is_not_lifted(tmp_path: Path) -> None:
+    own(tmp_path)
+    step = started(harness.law(f"{tmp_path / 'own.py'}:Own"), UNKNOWN)
+    write(tmp_path / "own.py", OWN.replace("{memory}", "").replace("max(-self", "max(-2 * self"))
+    with pytest.raises(NotLiftedError, match=r"own\.py has changed since it was loaded"):
+        module_of(step)
+
+
+def test_a_watched_flight_tells_its_time_before_and_after_its_blocks_of_rows() -> None:
+    times: list[float] = []
+    engine._trusted(FLIGHT, lambda time, so_far: times.append(time))
+    assert times == [0.0, FLIGHT.duration]
+
+
+def test_a_law_whose_numbers_differ_compiled_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "_TRUSTED", set())
+    draws = random.Random(1)
+    flight = replace(FLIGHT, law=OwnLaw(lambda: lambda o: turning(draws.random())))
+    assert engine.why_plain(flight)
+    assert engine.simulate(flight).outcome is Outcome.COMPLETED
+
+
+def test_kernels_go_to_the_temporary_files_where_the_cache_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from harness.compiled import kernel
+
+    write(tmp_path / "file", "")
+    monkeypatch.setenv(kernel.FOLDER, str(tmp_path / "file" / "cache"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    found = kernel.folder.__wrapped__()
+    assert found.parent == tmp_path
+    assert found.stat().st_mode & 0o77 == 0
