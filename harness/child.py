@@ -1,27 +1,29 @@
 """Running a function in a process of its own, with limits: what it does to that process, it does not do to this one.
 
-A server is started once, which has imported what the first function needs; each call is a fork of it, and takes some
-milliseconds.
+A server, which is started once, has imported the module of the function; each call is a fork of it, and takes some
+milliseconds. Server and child end with this process, and use pipes alone: no file and no socket that others could find.
 """
 
 import math
 import multiprocessing
+import os
 import pickle
 import resource
 import signal
 import threading
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Connection
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from harness.error import HarnessError
-from harness.pool import end_with_parent
+from harness.pool import SPAWN, THREADS
 
 SECONDS = 60.0  # on the clock
 MEMORY = 2 << 30  # bytes more than the process has when the function is called
-_FORKS = multiprocessing.get_context("forkserver")
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
@@ -53,26 +55,14 @@ def limited(
     **kwargs: Given.kwargs,
 ) -> Result:
     """`in_child` with other limits: bytes, and seconds on the clock, which each call of `alive` starts anew."""
-    modules = {function.__module__, *(type(given).__module__ for given in args)}
-    _FORKS.set_forkserver_preload(sorted(modules))  # of effect before the first call only
-    answers, answer = _FORKS.Pipe(duplex=False)
-    process = _FORKS.Process(target=_answer, args=(answer, seconds, memory, function, args, kwargs), daemon=True)
-    process.start()
-    answer.close()
-    try:
-        returned = None
-        while returned is None:
-            if not answers.poll(seconds):
-                raise ChildError(stage, f"was not done in {seconds:g} s", is_late=True)
-            returned, value = answers.recv()
-    except EOFError:
-        process.join()
-        raise ChildError(stage, f"the process {how_ended(process.exitcode)}") from None
-    finally:
-        process.kill()
-        process.join()
-        process.close()
-        answers.close()
+    modules = {function.__module__, *(type(given).__module__ for given in args)} - {"__main__"}
+    call = _Call(seconds, memory, tuple(sorted(modules)), pickle.dumps((function, args, kwargs)))
+    ended, message = _server().answer(call)
+    if ended is None:
+        raise ChildError(stage, f"was not done in {seconds:g} s", is_late=True)
+    if not message:
+        raise ChildError(stage, f"the process {how_ended(ended)}")
+    returned, value = pickle.loads(message)
     if returned:
         return value  # type: ignore[no-any-return]
     if isinstance(value, MemoryError):
@@ -88,10 +78,104 @@ def how_ended(code: int | None) -> str:
     return f"ended with exit code {code}"
 
 
+class _Call(NamedTuple):
+    seconds: float
+    memory: int
+    modules: tuple[str, ...]  # what the server imports first
+    content: bytes  # the function and its arguments, pickled
+
+
+class _Answer(NamedTuple):
+    ended: int | None  # the exit code of the child; None when its time was over
+    message: bytes  # whether the function returned, and what it returned or raised, pickled; empty without an answer
+
+
+class _Server:
+    """The process that forks, as this one sees it."""
+
+    def __init__(self) -> None:
+        self._calls, calls = SPAWN.Pipe()
+        self._process = SPAWN.Process(target=_serve, args=(calls,), daemon=True)
+        self._process.start()
+        calls.close()
+        self._lock = threading.Lock()
+        self._of = os.getpid()
+
+    @property
+    def serves(self) -> bool:
+        """Whether it is there, and is this process's: a fork of this one must not use it."""
+        return self._of == os.getpid() and self._process.is_alive()
+
+    def answer(self, call: _Call) -> _Answer:
+        with self._lock:
+            try:
+                self._calls.send(call)
+                return _Answer(*self._calls.recv())
+            except (EOFError, OSError):
+                self._process.join()
+                return _Answer(self._process.exitcode, b"")
+            except BaseException:  # Ctrl-C: the child ends with the server
+                self._process.kill()
+                self._process.join()
+                raise
+
+
+_servers: list[_Server] = []  # the last one serves
+
+
+def _server() -> _Server:
+    if not (_servers and _servers[-1].serves):
+        _servers.append(_Server())
+    return _servers[-1]
+
+
+# In the server
+
+
+def _serve(calls: Connection) -> None:
+    """Answers one call after the other until the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # a fork has only one
+    while True:
+        try:
+            call = _Call(*calls.recv())
+        except EOFError:
+            return
+        for module in call.modules:
+            with suppress(ImportError):
+                import_module(module)
+        answers, answer = multiprocessing.Pipe(duplex=False)
+        server = os.getpid()
+        if (child := os.fork()) == 0:
+            calls.close()
+            threading.Thread(target=_end_with, args=(server,), daemon=True).start()
+            _run(call, answer)
+        answer.close()
+        late, message = _awaited(answers, calls, call.seconds)
+        answers.close()
+        if message or late:
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        calls.send(tuple(_Answer(None if late else os.waitstatus_to_exitcode(status), message)))
+
+
+def _awaited(answers: Connection, calls: Connection, seconds: float) -> tuple[bool, bytes]:
+    """Whether the child's time was over, and its message; empty when it has ended without one."""
+    while ready := wait([answers, calls], timeout=seconds):
+        if calls in ready:  # the parent is gone
+            return True, b""
+        try:
+            if message := answers.recv_bytes():
+                return False, message
+        except (EOFError, OSError):  # also in the middle of a message
+            return False, b""
+    return True, b""
+
+
 # In the child
 
 _TELL_EVERY = 0.5  # s
-_NONE = (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)  # a file has no room for a byte, and nothing dumps a core
+_NOTHING = (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)  # no file has room for a byte, and nothing dumps a core
 _told: dict[str, Any] = {}  # where to answer, the limit in s, and when it was last told that the function goes on
 
 
@@ -100,31 +184,32 @@ def alive(*_: object) -> None:
     if _told and time.monotonic() > _told["at"] + _TELL_EVERY:
         _told["at"] = time.monotonic()
         _limit_time(_told["seconds"])
-        _told["answer"].send((None, None))
+        _told["answer"].send_bytes(b"")
 
 
-def _answer(
-    answer: Connection,
-    seconds: float,
-    memory: int,
-    function: Callable[..., object],
-    args: tuple[Any, ...],
-    kwargs: dict[str, Any],
-) -> None:
-    """Sends whether the function returned, and what it returned or raised."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=end_with_parent, daemon=True).start()
-    for what, most in ((resource.RLIMIT_AS, _address_space() + memory), *((what, 0) for what in _NONE)):
-        _, hard = resource.getrlimit(what)
-        least = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(what, (least, least))
-    _limit_time(seconds)
-    _told.update(answer=answer, seconds=seconds, at=time.monotonic())
+def _run(call: _Call, answer: Connection) -> None:
+    """Sends whether the function returned, and what it returned or raised; ends the process."""
     try:
-        message = pickle.dumps((True, function(*args, **kwargs)))
-    except Exception as error:
-        message = _pickled(error)
-    answer.send_bytes(message)
+        for what, most in ((resource.RLIMIT_AS, _address_space() + call.memory), *((what, 0) for what in _NOTHING)):
+            _, hard = resource.getrlimit(what)
+            least = most if hard == resource.RLIM_INFINITY else min(most, hard)
+            resource.setrlimit(what, (least, least))
+        _limit_time(call.seconds)
+        _told.update(answer=answer, seconds=call.seconds, at=time.monotonic())
+        try:
+            function, args, kwargs = pickle.loads(call.content)
+            message = pickle.dumps((True, function(*args, **kwargs)))
+        except Exception as error:
+            message = _pickled(error)
+        answer.send_bytes(message)
+    finally:
+        os._exit(1)
+
+
+def _end_with(server: int) -> None:
+    while os.getppid() == server:
+        time.sleep(0.2)
+    os._exit(1)
 
 
 def _limit_time(seconds: float) -> None:

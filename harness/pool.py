@@ -81,12 +81,12 @@ def computed(jobs: Sequence[Callable[[], Result]], workers: int) -> Iterator[Res
 
 def _begin(prepare: Callable[..., None] | None, *arguments: Any) -> None:
     """In a worker, before its first job."""
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     if prepare:
         prepare(*arguments)
 
 
-def end_with_parent() -> None:
+def _end_with_parent() -> None:
     """A worker whose parent was killed ends at once: nobody waits for its results."""
     parent = multiprocessing.parent_process()
     assert parent

@@ -4,18 +4,21 @@ import os
 import shutil
 import signal
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import jsbsim
+import psutil
 import pytest
 
 from harness import fence
 from harness.child import ChildError, in_child, limited
 from harness.fence import FenceError, checked, fenced
 from harness.plants.sixdof import FT, SLUG
-from tests.builders import write
+from tests.builders import ROOT, write
 
 LIBRARY = Path(jsbsim.get_default_root_dir())
 QUICK = 20.0  # s within which each hostile case is over
@@ -244,6 +247,38 @@ def test_what_a_child_returns_or_raises_is_there_and_how_it_ended_is_told(tmp_pa
         limited("circle", 0.3, 1 << 30, spin)
     with pytest.raises(OSError, match="too large"):
         in_child("load", write_to, tmp_path / "file")
+
+
+WAITING = """
+import sys, time
+from harness.child import in_child
+if __name__ == "__main__":
+    in_child("load", time.sleep, 30.0)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_child_ends_with_its_parent_and_leaves_no_file(number: signal.Signals, tmp_path: Path) -> None:
+    script = write(tmp_path / "script.py", WAITING)
+    (tmp_path / "temporary").mkdir()
+    environment = {**os.environ, "TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen([sys.executable, script], env=environment, stderr=subprocess.DEVNULL) as parent:
+
+        def below() -> list[psutil.Process]:
+            return list(psutil.Process(parent.pid).children(recursive=True))
+
+        until(lambda: any(each.parent() in below() for each in below()))  # the child of the server
+        processes = below()
+        parent.send_signal(number)
+    until(lambda: not any(each.is_running() and each.status() != psutil.STATUS_ZOMBIE for each in processes))
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def until(true: Callable[[], bool]) -> None:
+    end = time.monotonic() + QUICK
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 @pytest.mark.parametrize("name", ["trim", "delay"])

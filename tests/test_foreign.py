@@ -17,7 +17,7 @@ from tests import builders
 from tests.builders import WORKERS, copied_airframe, fly_matrix, write
 from tests.confined import Confined, Ended
 
-TEMPORARY = ("standoff-harness-", "pymp-")  # begin the names of what a command removes when its process ends
+TEMPORARY = "standoff-harness-"  # begins the name of what a command removes when its process ends
 
 SIXDOF = """\
 title = "A title"
