@@ -18,9 +18,10 @@ from harness.flight import Flight
 from harness.key import flight_key
 from harness.plants.plant import Start
 from harness.recorded.assessment import CANNOT, LAG, LATERAL, Assessment, assess
+from harness.recorded.beside import beside
 from harness.recorded.fitted_plant import document
 from harness.recorded.recorded_flight import Basis, LogError, LoggedEvent, RecordedFlight, sampled
-from harness.recorded.said import as_json, lines
+from harness.recorded.said import as_json, beside_lines, lines
 from harness.verdict.parts import PARTS
 from harness.vocabulary import Verdict
 from tests.builders import invoke, write
@@ -251,3 +252,24 @@ def test_no_aircraft_is_fitted_to_a_log_that_does_not_tell_it(
 ) -> None:
     with pytest.raises(LogError, match=reason):
         document(assess(change(log(ON_BOARD).recorded())))
+
+
+def test_beside_a_flight_of_the_model_itself_the_model_says_the_same() -> None:
+    found = assess(log(ON_BOARD).recorded())
+    model = beside(found, aircraft.folder(log(ON_BOARD).flight.aircraft))
+    assert model.ended == ""
+    assert model.assessment[RELATION].value == pytest.approx(found[RELATION].value, abs=0.01)
+    assert model.assessment[LATERAL.title].value == pytest.approx(found[LATERAL.title].value, abs=0.02)
+    table = "\n".join(beside_lines(found, model))
+    assert "turn relation" in table
+
+
+def test_no_model_flies_beside_a_log_that_does_not_tell_how(fitted: Path) -> None:
+    found = assess(log(ON_BOARD).recorded())
+    with pytest.raises(LogError, match="flies from"):
+        beside(found, aircraft.folder("aerosonde"))
+    with pytest.raises(LogError, match="was fitted to a flight"):
+        beside(found, fitted)
+    short = invoke("assess", "experiments/flights/lateral_doublet_4.csv", "--airframe", "skywalker_x8")
+    assert short.exit_code == 2
+    assert "it does not tell bank and wind" in str(short.exception) + short.output

@@ -18,6 +18,7 @@ from harness.cli._paths import PATH
 @click.option(
     "--fit", type=PATH, metavar="FILE.toml", help="Write the aircraft of this flight: lagged and coordinated."
 )
+@click.option("--airframe", metavar="NAME", help="Fly this airframe's 6-DOF model beside it: a name or a folder.")
 @click.option("--rrd", type=PATH, help="Write a Rerun recording to this file.")
 @click.option("--out", type=PATH, metavar="PAGE.html", help="Write what is said, with pictures, as one page.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
@@ -27,6 +28,7 @@ def assess(
     begin: float,
     end: float,
     fit: Path | None,
+    airframe: str | None,
     rrd: Path | None,
     out: Path | None,
     as_json: bool,
@@ -38,6 +40,9 @@ def assess(
     estimated by a filter, commanded or derived; and what is wrong with the log. Then what the flight says of each part
     of the assumption, in the words and within the margins of harness compare, with an interval over independent windows
     of flight; and what it cannot say, with the reason. The time is in seconds since the log's first row.
+
+    With --airframe the 6-DOF model of that airframe is flown with the recorded bank, at the recorded airspeed and in
+    the recorded wind, and the same parts are told of it.
 
     With --fit the response of the bank to its command is written to a file, which stands for an aircraft in settings
     (aircraft = "FILE.toml"): fly and predict take it on the plants lagged and coordinated. A log that does not tell the
@@ -51,11 +56,13 @@ def assess(
     """
     import json
 
+    from harness.checks import airframe_of
     from harness.cli._input import BadInput, typed
     from harness.cli._paths import writable
     from harness.files import write_text
     from harness.recorded import contents, fitted_plant, said
     from harness.recorded.assessment import assess as assessed
+    from harness.recorded.beside import beside
     from harness.recorded.read import read_log
 
     if not begin < end:
@@ -66,7 +73,12 @@ def assess(
     flight = whole.between(begin, end)
     if not flight.channels:
         raise BadInput(f"--from {begin:g} --to {end:g}: the log goes from {whole.begin:.2f} to {whole.end:.2f} s")
+    try:
+        model_of = None if airframe is None else airframe_of(airframe)
+    except ValueError as error:
+        raise BadInput(f"--airframe: {error}") from None
     found = assessed(whole, begin, end)
+    model = None if model_of is None else beside(found, model_of)
     if fit is not None:
         write_text(fit, fitted_plant.document(found))
     if rrd is not None:
@@ -78,9 +90,15 @@ def assess(
 
         write_text(out, page(whole, found, typed()))
     if as_json:
-        click.echo(json.dumps({**contents.as_json(flight), "assessment": said.as_json(found)}, indent=2))
+        told = {**contents.as_json(flight), "assessment": said.as_json(found)}
+        if model:
+            told["model"] = {"airframe": model.airframe, "ended": model.ended, **said.as_json(model.assessment)}
+        click.echo(json.dumps(told, indent=2))
         return
     for line in (*contents.contents(flight), "", *said.lines(found)):
         click.echo(line)
+    if model:
+        for line in ("", *said.beside_lines(found, model)):
+            click.echo(line)
     if fit:
         click.echo(f"\naircraft = {json.dumps(str(fit))}: for the plants lagged and coordinated")

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from harness.recorded.assessment import CANNOT, Assessment, PartFinding
+from harness.recorded.beside import ModelFlight
 from harness.tables import number, table
 from harness.vocabulary import Verdict
 
@@ -53,6 +54,25 @@ def wind_line(found: Assessment) -> Iterator[str]:
         for towards, (value, low, high) in (("north", found.wind.north), ("east", found.wind.east))
     ]
     yield f"wind, by the {found.wind.source}: the air moves {parts[0]}, {parts[1]}"
+
+
+def beside_lines(found: Assessment, model: ModelFlight) -> Iterator[str]:
+    """The recorded flight and the model, part by part."""
+    yield f"Beside the model {model.airframe}, which banks as was recorded, at {model.airspeed:.1f} m/s in this wind:"
+    yield ""
+    rows = [
+        [recorded.part.title, _interval(recorded), _interval(model.assessment[recorded.part.title]), recorded.part.unit]
+        for recorded in found.findings
+    ]
+    yield from table(["part", "recorded", model.airframe, "unit"], rows, "lrrl")
+    if model.ended:
+        yield f"The model's flight ended before the recording: {model.ended}."
+
+
+def _interval(finding: PartFinding) -> str:
+    if finding.word == CANNOT:
+        return "-"
+    return f"{number(finding.value)} [{number(finding.low)}, {number(finding.high)}]"
 
 
 def as_json(found: Assessment) -> dict[str, Any]:
