@@ -283,7 +283,7 @@ def _written(element: ElementTree.Element, is_declaration: bool) -> Iterator[str
     """The names of the properties that the element writes or makes."""
     yield element.get("name", "")
     if is_declaration or element.tag == "output" or (element.tag == "property" and "value" in element.attrib):
-        yield element.text or ""
+        yield from (element.text or "").splitlines()  # JSBSim takes the first that is not empty
 
 
 def _check_delay(element: ElementTree.Element) -> None:

@@ -76,6 +76,7 @@ HOSTILE: dict[str, tuple[Callable[[str], str], str]] = {
     "named reset": (lambda model: model.replace("fcs/twice", "simulation/reset"), "writes simulation/reset"),
     "declared": (section('<system><property value="1">simulation/write-state-file</property></system>'), "writes sim"),
     "upwards": (gain("<output> fcs/../simulation/reset </output>"), "writes fcs/../simulation/reset"),
+    "second line": (gain("<output>\n \n simul<!-- -->ation/reset \n fcs/x </output>"), "writes simulation/reset"),
     "distributed": (
         section(
             '<system><channel><distributor><case><property value="1">simulation/reset</property></case></distributor>'

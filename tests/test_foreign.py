@@ -5,6 +5,7 @@ import os
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import harness
 from harness.files import content_hash
 from harness.runs.store import JOURNAL
 from tests import builders
-from tests.builders import WORKERS, copied_airframe, fly_matrix, write
+from tests.builders import FLIGHT, HERE, WORKERS, copied_airframe, fly_matrix, write
 from tests.confined import Confined, Ended
 
 TEMPORARY = "standoff-harness-"  # begins the name of what a command removes when its process ends
@@ -255,13 +256,16 @@ ENDLESS = """<system name="endless"><function name="a/c"><sum><property>a/d</pro
 BY_ZERO = """<system name="by zero"><channel name="c"><fcs_function name="a/b"><function><mod><value>7</value>
 <difference><value>3</value><floor><property>simulation/sim-time-sec</property></floor></difference></mod></function>
 </fcs_function></channel></system>"""
+ROOT_OF_MINUS = """<system name="root"><channel name="c"><fcs_function name="a/b"><function><sqrt><difference>
+<value>2</value><property>simulation/sim-time-sec</property></difference></sqrt></function>
+<output>fcs/rudder-pos-rad</output></fcs_function></channel></system>"""
 NO_BODY = """<pointmass name="none"><weight unit="KG"> -20 </weight>
 <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location></pointmass></mass_balance>"""
 
 
-def with_model(folder: Path, text: str, before: str = "</fdm_config>") -> Path:
+def with_model(folder: Path, text: str, before: str = "</fdm_config>", of: str = "aerosonde") -> Path:
     """An airframe of somebody else as `folder`, whose model has this text too."""
-    airframe = copied_airframe("aerosonde", folder)
+    airframe = copied_airframe(of, folder)
     model = airframe / f"{airframe.name}.xml"
     write(model, model.read_text(encoding="utf-8").replace(before, text if before in text else f"{text}{before}"))
     return airframe
@@ -285,11 +289,22 @@ def test_a_model_that_ends_the_process_in_flight_is_a_row_with_the_reason(tmp_pa
     rows = harness.load_results(tmp_path / "run")
     assert rows["outcome"].tolist() == ["completed", "completed", "worker_died", "worker_died"]
     assert rows["reason"].tolist()[2:] == ["its worker was ended by SIGFPE"] * 2
-    alone = builders.command(
-        "fly", write(tmp_path / "one.toml", text.partition("[matrix]")[0]), "--set", "aircraft=late"
-    )
+    fly_matrix(file, tmp_path / "here", options=HERE)  # without workers
+    here = harness.load_results(tmp_path / "here")
+    assert here["outcome"].tolist() == rows["outcome"].tolist()
+    assert here["digest"].tolist() == rows["digest"].tolist()
+    one = write(tmp_path / "one.toml", text.partition("[matrix]")[0])
+    alone = builders.command("fly", one, "--set", "aircraft=late")
     assert alone.returncode == 1
     assert "outcome: worker_died: the flight: the process was ended by SIGFPE" in alone.stdout
+
+
+def test_a_flight_of_which_any_number_is_not_finite_ends(tmp_path: Path) -> None:
+    """A flying wing's rudder moves nothing, so nothing else tells of it."""
+    airframe = with_model(tmp_path / "wing", ROOT_OF_MINUS, of="skywalker_x8")
+    log = harness.simulate(replace(FLIGHT, plant="sixdof", aircraft=str(airframe), duration=5.0))
+    assert (log.outcome, log.reason) == ("invalid", "a number of the simulated aircraft is not finite")
+    assert 1.9 < log["time"][-1] < 2.1
 
 
 def test_a_model_that_is_no_body_is_refused_once_it_is_loaded(tmp_path: Path) -> None:

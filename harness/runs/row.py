@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from harness.checks import model_of_another
 from harness.compiled import engine
 from harness.feasibility import feasibility_margin
 from harness.flight import Flight
@@ -15,6 +16,7 @@ from harness.log import COLUMNS, FlightLog
 from harness.log.metric import METRICS, measure
 from harness.loop import Watch, simulate
 from harness.plants.plant import Outcome, PlantError
+from harness.runs import apart
 
 # key, outcome, reason, digest, flight, metrics, feasibility_margin_deg_s: none without a limit, -inf where no heading
 # rate holds the circle
@@ -60,6 +62,8 @@ def json_of(row: FlightRow) -> str:
 
 def result_of(log: FlightLog, seconds: float | None = None) -> FlightResult:
     """How a flight went, from its log; `seconds` is the wall time of its simulation."""
+    if log.outcome.of_machine and not len(log):
+        return failed_result(log.outcome, log.reason)
     return FlightResult(log.outcome.value, log.reason, log.digest, measure(log), final(log), seconds)
 
 
@@ -68,14 +72,19 @@ def failed_result(outcome: Outcome, reason: str) -> FlightResult:
     return FlightResult(outcome.value, reason, "", dict.fromkeys(METRICS), {}, None)
 
 
-def simulate_safely(flight: Flight, watch: Watch | None = None, *, compiled: bool = False) -> FlightLog:
+def simulate_safely(
+    flight: Flight, watch: Watch | None = None, *, compiled: bool = False, in_worker: bool = True
+) -> FlightLog:
     """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others.
 
-    With `compiled` by a compiled loop where that can be: to the same bits.
+    With `compiled` by a compiled loop where that can be: to the same bits. A worker may die of the model of somebody
+    else; another process may not.
 
     Raises MemoryError.
     """
     try:
+        if not in_worker and model_of_another(flight):
+            return apart.fly(flight)
         return engine.simulate(flight, watch) if compiled else simulate(flight, watch)
     except MemoryError:
         raise  # the machine's fault, not the flight's

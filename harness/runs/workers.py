@@ -83,7 +83,7 @@ def fly_task(task: Task, folder: Path) -> WorkerResult:
     """Flies a task, in a worker, and writes its recording if the task asks for one."""
     begin, problem = time.perf_counter(), ""
     try:
-        log = simulate_safely(task.flight, _note, compiled=task.compiled)
+        log = simulate_safely(task.flight, _note, compiled=task.compiled, in_worker=bool(_SHARED))
         _note(_NOT_IN_FLIGHT)
         result = result_of(log, time.perf_counter() - begin)
     except MemoryError:
