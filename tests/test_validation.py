@@ -10,8 +10,9 @@ import aircraft
 from harness.plants import sixdof
 from harness.plants.sixdof import REPLAYED, Moment
 from harness.recorded.frames import to_earth
+from harness.recorded.read import read_log
 from harness.recorded.recorded_flight import Array, Basis, Channel, RecordedFlight
-from harness.recorded.validation import ALTITUDE, STEP, Adjusted, validated
+from harness.recorded.validation import ALTITUDE, STEP, Adjusted, explained, validated
 from tests.builders import EXPERIMENTS, invoke
 
 X8 = aircraft.folder("skywalker_x8")
@@ -69,6 +70,14 @@ def test_the_x8_rolls_as_flown_and_does_not_yaw_so(tmp_path: Path) -> None:
     assert found["adjusted"]["explained_percent"]["yaw_rate"][-1] < 50.0
     assert 0.05 < found["adjusted"]["delay"] < 0.08  # the article identifies 0.07 s
     assert save.read_text(encoding="utf-8").count("<path") > 20
+
+
+def test_the_lateral_coefficients_of_2025_explain_more_of_the_yaw() -> None:
+    flights = [read_log([path]) for path in MANOEUVRES]
+    later = EXPERIMENTS / "airframes" / "skywalker_x8_2025"
+    before, after = (explained(airframe, flights, Adjusted(), 1.0) for airframe in (X8, later))
+    assert after["yaw_rate"] > before["yaw_rate"] + 10.0
+    assert after["roll_rate"] >= before["roll_rate"] - 1.0
 
 
 def test_a_flight_that_cannot_be_replayed_is_one_line(tmp_path: Path) -> None:

@@ -173,15 +173,28 @@ def _errors(replay: Replay) -> Array:
     return np.where(np.isfinite(replay.simulated), errors, np.pi)
 
 
+def explained(
+    airframe: Path, flights: Sequence[RecordedFlight], adjusted: Adjusted, horizon: float
+) -> dict[str, float]:
+    """How much of the variance of each of `JUDGED` the model explains over this horizon, %; NaN without any start."""
+    return _explained([r for flight in flights for r in _replays(airframe, flight, horizon, APART, adjusted)])
+
+
+def _explained(replays: Sequence[Replay]) -> dict[str, float]:
+    shares = {}
+    for name in JUDGED:
+        k = REPLAYED.index(name)
+        wrong = sum(float(np.sum(_errors(replay)[:, k] ** 2)) for replay in replays)
+        varied = sum(float(np.sum((r.recorded[:, k] - r.recorded[:, k].mean()) ** 2)) for r in replays)
+        shares[name] = 100.0 * (1.0 - wrong / varied) if varied else math.nan
+    return shares
+
+
 def _fit(airframe: Path, flights: Sequence[RecordedFlight], adjusted: Adjusted) -> ReplayFit:
-    explained: dict[str, list[float]] = {name: [] for name in JUDGED}
-    starts = []
-    for horizon in HORIZONS:
-        replays = [replay for flight in flights for replay in _replays(airframe, flight, horizon, APART, adjusted)]
-        starts.append(len(replays))
-        for name in JUDGED:
-            k = REPLAYED.index(name)
-            wrong = sum(float(np.sum(_errors(replay)[:, k] ** 2)) for replay in replays)
-            varied = sum(float(np.sum((r.recorded[:, k] - r.recorded[:, k].mean()) ** 2)) for r in replays)
-            explained[name].append(100.0 * (1.0 - wrong / varied) if varied else math.nan)
-    return ReplayFit(adjusted, {name: tuple(values) for name, values in explained.items()}, tuple(starts))
+    replays = {
+        horizon: [r for flight in flights for r in _replays(airframe, flight, horizon, APART, adjusted)]
+        for horizon in HORIZONS
+    }
+    shares = [_explained(replays[horizon]) for horizon in HORIZONS]
+    by_name = {name: tuple(share[name] for share in shares) for name in JUDGED}
+    return ReplayFit(adjusted, by_name, tuple(len(replays[horizon]) for horizon in HORIZONS))
