@@ -42,11 +42,8 @@ def oscillation(command: Array, flown: Array, period: float) -> Oscillation | No
 
     None where the record cannot tell: shorter than `SHORTEST`, not finite, or sampled too slowly for `SLOWEST`.
     """
-    lasted = len(flown) * period
-    if lasted < SHORTEST or not (np.isfinite(command).all() and np.isfinite(flown).all()):
-        return None
-    slowest = max(SLOWEST, FEWEST_CYCLES / lasted)
-    if slowest > 0.5 / period:
+    slowest = _slowest(command, flown, period)
+    if slowest is None:
         return None
     u, y = (_without_slow(x, 1.0 / (slowest * period)) for x in (command, flown))
     frequency = _strongest(y, period, slowest)
@@ -56,6 +53,25 @@ def oscillation(command: Array, flown: Array, period: float) -> Oscillation | No
     correlation = max(_correlation(y, lag) for lag in lags)
     chatters = False if swing < VISIBLE else True if correlation >= LEAST_CORRELATION else None
     return Oscillation(chatters, frequency, amplitude, swing, correlation)
+
+
+def rests(command: Array, flown: Array, period: float) -> bool:
+    """Whether `oscillation` finds no limit cycle for this alone, that the command nowhere swings by `VISIBLE`."""
+    slowest, still = _slowest(command, flown, period), 2.0 * VISIBLE * (1.0 - 1e-9)  # less is rounding
+    if slowest is None:
+        return False
+    if 2.0 * np.ptp(command) < still:  # what is left beside an average reaches no farther
+        return True
+    return bool(np.ptp(_without_slow(command, 1.0 / (slowest * period))) < still)
+
+
+def _slowest(command: Array, flown: Array, period: float) -> float | None:
+    """The lowest frequency that is looked for, Hz; None where the record cannot tell."""
+    lasted = len(flown) * period
+    if lasted < SHORTEST or not (np.isfinite(command).all() and np.isfinite(flown).all()):
+        return None
+    slowest = max(SLOWEST, FEWEST_CYCLES / lasted)
+    return slowest if slowest <= 0.5 / period else None
 
 
 def spectrum(command: Array, period: float) -> tuple[Array, Array]:

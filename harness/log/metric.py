@@ -269,7 +269,7 @@ _METRICS = (
         name="chatters",
         unit=YES_OR_NO,
         meaning="whether a limit cycle shows; null where gusts may hide one, or where the judged time is below 30 s",
-        measure=lambda signals: signals.oscillation.chatters if signals.oscillation else None,
+        measure=lambda signals: signals.chatters,
         heading="limit cycle",
         of_circling=True,
     ),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.chatter import Oscillation, oscillation
+from harness.chatter import Oscillation, oscillation, rests
 from harness.feasibility import feasibility_margin
 from harness.log.flight_log import FlightLog
 from harness.plants.plant import Outcome
@@ -112,10 +112,18 @@ class Signals:
         first = self.window.first
         return oscillation(self.held_command[first:], self.flown_rate[first:], self.period)
 
+    @cached_property
+    def chatters(self) -> bool | None:
+        """Whether there is a limit cycle while circling is judged; None when the record cannot tell."""
+        first = self.window.first
+        if rests(self.held_command[first:], self.flown_rate[first:], self.period):
+            return False
+        return self.oscillation.chatters if self.oscillation else None
+
     @property
     def limit_cycle(self) -> Oscillation | None:
         """The limit cycle while circling is judged; None when there is none, or none to be told."""
-        return self.oscillation if self.oscillation and self.oscillation.chatters else None
+        return self.oscillation if self.chatters else None
 
 
 def at_limit(log: FlightLog) -> NDArray[np.bool_]:

@@ -1,7 +1,8 @@
 """The settings of a flight's wind."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Annotated
 
@@ -11,6 +12,7 @@ from annotated_types import Ge, Le
 from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre, OneOf, Seconds
 from harness.world.air import Air, Array
 
+_SHARED = 1_000_000  # steps: longer air is not kept, since it takes hundreds of MB
 _Gusty = Annotated[MetresPerSecond, Ge(-100), Le(100)]
 
 
@@ -58,16 +60,22 @@ class Wind:
         if self == Wind(steady=self.steady, rotation=self.rotation):
             return Air(steady=self.steady)
         steps = round(duration / step)
-        time = step * np.arange(steps + 1, dtype=np.float64)
-        gusts = self.gust(time)
-        air = Air(steady=self.steady, shear=self.shear, altitude=altitude, step=step, gusts=gusts)
-        if self.turbulence == "none":
-            return air
+        made = _made if steps <= _SHARED else _made.__wrapped__
+        return made(self, airspeed, altitude, step, steps, seed)
+
+
+@lru_cache(maxsize=1)
+def _made(wind: Wind, airspeed: float, altitude: float, step: float, steps: int, seed: int) -> Air:
+    """The air on its grid; of flights that differ in plant or law alone it is made once."""
+    gusts = wind.gust(step * np.arange(steps + 1, dtype=np.float64))
+    rotation = None
+    if wind.turbulence != "none":
         from harness.world.turbulence import dryden, turbulence  # late: only turbulence needs SciPy
 
-        W_x, W_y = self.steady
-        model = dryden(self.turbulence, airspeed, altitude)
+        W_x, W_y = wind.steady
+        model = dryden(wind.turbulence, airspeed, altitude)
         field = turbulence(model, math.atan2(W_y, W_x), seed, step, steps)
-        return replace(
-            air, gusts=gusts + field.velocity[field.lead :], turbulence=field.rotation if self.rotation else None
-        )
+        gusts = gusts + field.velocity[field.lead :]
+        rotation = field.rotation if wind.rotation else None
+    gusts.setflags(write=False)
+    return Air(steady=wind.steady, shear=wind.shear, altitude=altitude, step=step, gusts=gusts, turbulence=rotation)
