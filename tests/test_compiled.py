@@ -114,7 +114,7 @@ OWN = '''
 from dataclasses import dataclass
 from math import hypot
 
-from autopilot.guidance import Guidance
+from autopilot.guidance import Guidance, telling
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Own:
             if self.broken and o.time > 1.0:
                 raise ValueError("it is broken")
             rate = max(-self.max_heading_rate, min(self.max_heading_rate, -self.gain * r))
-            return Guidance(rate, r, 0.0, 0.0, 0.0, rate)
+            return telling(Guidance(rate, r, 0, 0, 0, rate), far=abs(r))
 
         return step
 
@@ -168,6 +168,8 @@ def test_both_engines_make_the_same_rows_with_a_law_of_ones_own_whatever_it_rais
         tables.append(harness.load_results(tmp_path / name).set_index("key").drop(columns="seconds").sort_index())
     assert tables[0].equals(tables[1])
     assert {"", "the law raised ValueError: it is broken"} == set(tables[0]["reason"])
+    flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"))
+    assert np.array_equal(compiled(flight)["law_far"], loop.simulate(flight)["law_far"])
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from autopilot.response import Delay, Piece
 from harness import loop
 from harness.checks import problems
-from harness.compiled.kernel import NotCompiledError, is_installed, kernel, refuse
+from harness.compiled.kernel import Kernel, NotCompiledError, is_installed, kernel, refuse
 from harness.compiled.loop import COMPLETED, TARGET_LOST, UNUSUAL, at_once, flown, in_pieces
 from harness.flight import Flight, air_of, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, perfect_estimator
 from harness.log import COLUMNS, FlightLog
 from harness.plants.level import InPieces, Level, MovingInPieces
 from harness.plants.plant import End, Outcome
+from harness.toml_text import shortened
 from harness.world.air import Air
 from harness.world.target import Target, TargetState
 
@@ -56,10 +57,10 @@ def _trusted(flight: Flight, watch: loop.Watch | None) -> FlightLog:
         raise NotCompiledError("there is no Numba: pip install 'standoff-harness[fast]'")
     ready = _ready(flight)
     compiled, numbers = kernel(ready.function)
-    log = _flown(flight, watch, ready, partial(compiled, held_=numbers))
+    log = _flown(flight, watch, ready, compiled, numbers)
     if compiled not in _TRUSTED:
         plain = loop.simulate(flight)
-        if plain.outcome is not log.outcome or not np.array_equal(plain.table, log.table, equal_nan=True):
+        if plain.outcome is not log.outcome or not np.array_equal(plain.whole, log.whole, equal_nan=True):
             refuse(ready.function, "compiled, it does not fly to the last bit as in Python")
             raise NotCompiledError("compiled, it does not fly to the last bit as in Python")
         _TRUSTED.add(compiled)
@@ -97,28 +98,31 @@ def _ready(flight: Flight) -> _Ready:
     return _Ready(flown(law, step), air, tuple(flying.moved), motion.states, (given, *line))
 
 
-def _flown(flight: Flight, watch: loop.Watch | None, ready: _Ready, fly: Callable[..., Any]) -> FlightLog:
+def _flown(
+    flight: Flight, watch: loop.Watch | None, ready: _Ready, compiled: Kernel, held: tuple[Any, ...]
+) -> FlightLog:
     """The log of the flight. Raises `NotCompiledError` where it is left to Python."""
     period, last, instruments = flight.guidance_period, flight.periods, Instruments(flight)
     target = _target(flight.target, period, last)
     seen, rows = _known(flight, target)
-    table = np.full((last + 1, len(COLUMNS)), math.nan)
+    table, told = (np.full((last + 1, n), math.nan) for n in (len(COLUMNS), len(compiled.told)))
     fixed = (
         period, flight.start.altitude, flight.start.airspeed, *map(float, instruments.wind), instruments.scale,
         flight.metrics.monitoring_range or math.inf,
     )  # fmt: skip
-    before = target, seen, *ready.air.sampled(period, last), instruments.turns(last + 1), ready.line
+    before = target, seen, *ready.air.sampled(period, last), instruments.turns(last + 1), told, ready.line
     done, state, ended = 0, (ready.now, ready.states), COMPLETED
     outcome, reason = Outcome.COMPLETED, ""
 
     def log_so_far() -> FlightLog:
-        log = FlightLog(flight, outcome, reason, table[:done])
+        channels = {f"law_{name}": told[:done, i] for i, name in enumerate(compiled.told)}
+        log = FlightLog(flight, outcome, reason, table[:done], channels)
         return loop.completed(log, rows[:done] if rows is not None else None)
 
     while done <= last and ended == COMPLETED:
         end = min(last + 1, done + _AT_ONCE if done else 1) if watch else last + 1
         try:
-            ended, done, *state = fly(table, *before, (done, end, last), fixed, *state)
+            ended, done, *state = compiled.fly(table, *before, (done, end, last), fixed, *state, held)
         except (Exception, SystemExit) as error:
             _judge(ready.function, error)
             raise NotCompiledError(f"an error in the flight: {error}") from None
@@ -137,9 +141,10 @@ def _judge(function: Any, error: BaseException) -> None:
     from numba.core.errors import NumbaError
 
     if isinstance(error, NumbaError):
-        told = next((line.strip() for line in str(error).splitlines() if line.strip().startswith("Unknown")), "")
-        refuse(function, f"Numba does not compile it: {told or str(error).splitlines()[0]}")
-        raise NotCompiledError(f"Numba does not compile it: {told or str(error).splitlines()[0]}") from None
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        why = f"Numba does not compile it: {shortened(' '.join(lines[1:3]))}"
+        refuse(function, why)
+        raise NotCompiledError(why) from None
 
 
 @lru_cache(maxsize=8)

@@ -9,7 +9,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from harness.compiled.lifted import NotLiftedError, Shape, held, module_of
 from harness.files import content_hash, replacing
@@ -38,10 +38,17 @@ def is_installed() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
-_KERNELS: dict[Shape, Callable[..., Any] | str] = {}  # by the shape of what the loop holds; or why there is none
+class Kernel(NamedTuple):
+    """A compiled loop."""
+
+    fly: Callable[..., Any]
+    told: tuple[str, ...]  # the names of the channels that its law tells
 
 
-def kernel(function: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+_KERNELS: dict[Shape, Kernel | str] = {}  # by the shape of what the loop holds; or why there is none
+
+
+def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
     """A function compiled, and what it is called with as its last argument. Raises `NotCompiledError`."""
     try:
         shape, numbers = held(function)
@@ -63,12 +70,12 @@ def refuse(function: Any, why: str) -> None:
     _KERNELS[held(function)[0]] = why
 
 
-def _loaded(function: Any) -> Callable[..., Any]:
+def _loaded(function: Any) -> Kernel:
     """The function of a module that is written, if there is none with this text, and imported."""
     import llvmlite
     import numba
 
-    body, name = module_of(function)
+    body, name, told = module_of(function)
     arithmetic = content_hash((Path(__file__).parent / "arithmetic.py").read_bytes())
     versions = f"{sys.version_info[:3]}, {numba.__version__}, {llvmlite.__version__}, {processor()}, {arithmetic}"
     text = f"{_HEADER.format(versions=versions)}{body}\n{name} = jit(cache=True)({name}.py_func)\n"
@@ -78,8 +85,7 @@ def _loaded(function: Any) -> Callable[..., Any]:
             partial.write_text(text, encoding="utf-8")
             os.utime(partial, (0, 0))  # the same in every process: Numba compiles anew what has another time
         _clear(file.parent)
-    found: Callable[..., Any] = getattr(_imported(file), name)
-    return found
+    return Kernel(getattr(_imported(file), name), told)
 
 
 def _imported(file: Path) -> ModuleType:

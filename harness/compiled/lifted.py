@@ -17,7 +17,7 @@ from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any, NamedTuple, cast
 
-from autopilot.guidance import Telling
+from autopilot.guidance import Guidance, Telling, telling
 from autopilot.response import dot
 
 Shape = tuple[Any, ...]  # of what a function holds: its code, then for each name what kind of thing it is
@@ -97,11 +97,21 @@ def _kind(name: str, value: Any) -> tuple[tuple[Any, ...], Any]:
     raise NotLiftedError(f"it holds {name}, which is {kind.__name__}")
 
 
-def module_of(function: Any) -> tuple[str, str]:
-    """The text of the lifted module, without its first lines, and the name of the function in it."""
+class Module(NamedTuple):
+    """A lifted module."""
+
+    text: str  # without its first lines
+    name: str  # of the function in it
+    told: tuple[str, ...]  # the names of the channels that a law tells
+
+
+def module_of(function: Any) -> Module:
+    """The lifted module of a function. Raises `NotLiftedError`."""
     lifting = _Lifting()
     name = lifting.function(function)
-    return "\n\n".join(lifting.texts) + "\n", name
+    if lifting.told and lifting.is_mirrored:
+        raise NotLiftedError("it is mirrored, and tells channels of its own")
+    return Module("\n\n".join(lifting.texts) + "\n", name, lifting.told or ())
 
 
 class _Lifting:
@@ -109,6 +119,8 @@ class _Lifting:
 
     def __init__(self) -> None:
         self.texts: list[str] = []
+        self.told: tuple[str, ...] | None = None
+        self.is_mirrored = False
         self._names: dict[Shape, str] = {}
 
     def function(self, function: Any) -> str:
@@ -127,6 +139,18 @@ class _Lifting:
         if key not in self._names:
             self._names[key] = f"r{len(self._names)}_{_plain(name)}"
             self.texts.append(f"{self._names[key]} = namedtuple({name!r}, {list(names)!r})")
+        return self._names[key]
+
+    def telling(self, names: tuple[str, ...]) -> str:
+        """The name in the module of the function that adds channels to an answer."""
+        of = [*Guidance._fields, *(f"law_{name}" for name in names)]
+        key = ("telling", *names)
+        if key not in self._names:
+            record, name = self.record("Telling", tuple(of)), f"t{len(self._names)}"
+            values = [f"g.{field}" for field in Guidance._fields] + of[len(Guidance._fields) :]
+            arguments = ", ".join(["g", *of[len(Guidance._fields) :]])
+            self.texts.append(f"@jit\ndef {name}({arguments}):\n    return {record}({', '.join(values)})")
+            self._names[key] = name
         return self._names[key]
 
 
@@ -258,7 +282,10 @@ class _Writer(ast.NodeTransformer):
             return self._replaced(called.value, node)
         what = self._looked_up(called)
         if what is isinstance and self._looked_up(node.args[1]) is Telling:
-            return ast.Constant(False)  # a law that tells channels of its own is not lifted
+            self._lifting.is_mirrored = True
+            return ast.Constant(False)
+        if what is telling:
+            return self._telling(node)
         if what in (min, max) and len(node.args) > 1 and not node.keywords:
             name = "smaller" if what is min else "larger"
             first, *rest = [self.visit(argument) for argument in node.args]
@@ -291,7 +318,18 @@ class _Writer(ast.NodeTransformer):
             if field not in by_name and field not in record._field_defaults:
                 raise NotLiftedError(f"{self._of.function.__name__} leaves out {field} of {record.__name__}")
             made.append(by_name[field] if field in by_name else self._constant(record._field_defaults[field]))
+        if record is Guidance:
+            made = [ast.Call(_name("float"), [value], []) for value in made]
         return ast.Call(name, made, [])
+
+    def _telling(self, node: ast.Call) -> ast.expr:
+        """An answer with channels, as a named tuple of both."""
+        names = tuple(one.arg or "" for one in node.keywords)
+        if self._lifting.told not in (None, names) or "" in names:
+            raise NotLiftedError(f"{self._of.function.__name__} tells now these channels, now others")
+        self._lifting.told = names
+        told: list[ast.expr] = [ast.Call(_name("float"), [self.visit(one.value)], []) for one in node.keywords]
+        return ast.Call(_name(self._lifting.telling(names)), [self.visit(node.args[0]), *told], [])
 
     def _replaced(self, what: ast.Name, node: ast.Call) -> ast.expr:
         """`_replace` of a parameter that is annotated with its named tuple."""

@@ -58,8 +58,8 @@ def flown(law: LawStep, step: Step) -> Callable[..., Any]:
     """The loop with this law and this plant."""
 
     def fly(
-        table: Any, target: Any, estimate: Any, air: Any, drift: Any, noise: Any, line: Any, rows: Any, fixed: Any,
-        now: Any, states: States,
+        table: Any, target: Any, estimate: Any, air: Any, drift: Any, noise: Any, told: Any, line: Any, rows: Any,
+        fixed: Any, now: Any, states: States,
     ) -> Any:  # fmt: skip
         """Fills the rows of the table from `first` on, until `end`; a flight ends with the row `last`.
 
@@ -99,6 +99,8 @@ def flown(law: LawStep, step: Step) -> Callable[..., Any]:
             table[k, _GUIDANCE + 3] = guidance.heading_error
             table[k, _GUIDANCE + 4] = guidance.feed_forward
             table[k, _GUIDANCE + 5] = guidance.unlimited_command
+            for i in range(6, len(guidance)):
+                told[k, i - 6] = guidance[i]
             if math.hypot(state.north - target[k, 0], state.east - target[k, 1]) > monitoring_range:
                 return TARGET_LOST, k + 1, now, states
             if k < last:
