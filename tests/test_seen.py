@@ -8,6 +8,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from harness.recorded.assessment import assess
+from harness.recorded.beside import ModelFlight
 from harness.recorded.page import page
 from harness.recorded.panels import scatter, track
 from harness.recorded.recorded_flight import Basis, LoggedEvent, RecordedFlight, sampled
@@ -39,6 +40,8 @@ def test_the_page_says_what_holds_what_is_refused_and_why(circling: RecordedFlig
     text = page(circling, found, "harness assess x")
     assert "no vane: the log has no sideslip" in text
     assert "failure: &lt;engine&gt;" in text
+    assert "Beside the model" not in text
+    assert "Beside the model aerosonde" in page(circling, found, "x", ModelFlight("aerosonde", 18.0, found, ""))
     assert not re.search(r"(?:src|href)=\"https?:", text)
     shown = scatter(found)
     assert shown is not None

@@ -88,7 +88,7 @@ def assess(
     if out is not None:
         from harness.recorded.page import page
 
-        write_text(out, page(whole, found, typed()))
+        write_text(out, page(whole, found, typed(), model))
     if as_json:
         told = {**contents.as_json(flight), "assessment": said.as_json(found)}
         if model:

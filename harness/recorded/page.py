@@ -10,17 +10,18 @@ from matplotlib.figure import Figure
 from harness.drawing import COLOURS, FAINT, INK, draw
 from harness.recorded import panels as drawn
 from harness.recorded.assessment import CANNOT, Assessment
+from harness.recorded.beside import ModelFlight
 from harness.recorded.contents import HEADINGS, duration, rows
 from harness.recorded.recorded_flight import RecordedFlight
 from harness.recorded.said import HEADINGS as SAID_HEADINGS
-from harness.recorded.said import row, wind_line
+from harness.recorded.said import beside_rows, row, wind_line
 from harness.template import template
 
 _COLOUR = {drawn.COMMANDED: COLOURS[4], drawn.FLOWN: INK, drawn.OTHER: COLOURS[1]}
 
 
-def page(whole: RecordedFlight, found: Assessment, command: str) -> str:
-    """The page, which loads nothing."""
+def page(whole: RecordedFlight, found: Assessment, command: str, model: ModelFlight | None = None) -> str:
+    """The page, which loads nothing; with the model's flight, if there is one, beside the recorded one."""
     shown = list(drawn.panels(whole, found))
     above = draw(partial(_above, whole=whole, found=found), height=4.2)
     below = draw(partial(_over_time, whole=whole, found=found, shown=shown), height=0.6 + 1.5 * max(1, len(shown)))
@@ -33,6 +34,8 @@ def page(whole: RecordedFlight, found: Assessment, command: str) -> str:
         refused=[finding for finding in found.findings if finding.word == CANNOT],
         headings=SAID_HEADINGS,
         wind=list(wind_line(found)),
+        model=model,
+        beside=beside_rows(found, model) if model else [],
         above=above,
         below=below if shown else "",
         channel_headings=[heading.replace("\n", " ") for heading in HEADINGS],

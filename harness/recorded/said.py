@@ -36,7 +36,7 @@ def lines(found: Assessment) -> Iterator[str]:
 
 def row(finding: PartFinding) -> list[str]:
     """The cells below `HEADINGS`."""
-    bound = finding.word == Verdict.UNDECIDED and finding.low == 0.0
+    bound = _is_bound(finding)
     interval = "" if bound else f"{number(finding.low)} to {number(finding.high)}"
     reason = finding.reason
     if finding.needed:
@@ -60,18 +60,29 @@ def beside_lines(found: Assessment, model: ModelFlight) -> Iterator[str]:
     """The recorded flight and the model, part by part."""
     yield f"Beside the model {model.airframe}, which banks as was recorded, at {model.airspeed:.1f} m/s in this wind:"
     yield ""
-    rows = [
+    yield from table(["part", "recorded", model.airframe, "unit"], beside_rows(found, model), "lrrl")
+    if model.ended:
+        yield f"The model's flight ended before the recording: {model.ended}."
+
+
+def beside_rows(found: Assessment, model: ModelFlight) -> list[list[str]]:
+    """The cells of that table: part, recorded, model, unit."""
+    return [
         [recorded.part.title, _interval(recorded), _interval(model.assessment[recorded.part.title]), recorded.part.unit]
         for recorded in found.findings
     ]
-    yield from table(["part", "recorded", model.airframe, "unit"], rows, "lrrl")
-    if model.ended:
-        yield f"The model's flight ended before the recording: {model.ended}."
+
+
+def _is_bound(finding: PartFinding) -> bool:
+    """Whether the value is the most that it may be, and nothing else is known."""
+    return finding.word == Verdict.UNDECIDED and finding.low == 0.0
 
 
 def _interval(finding: PartFinding) -> str:
     if finding.word == CANNOT:
         return "-"
+    if _is_bound(finding):
+        return f"<= {number(finding.value)}"
     return f"{number(finding.value)} [{number(finding.low)}, {number(finding.high)}]"
 
 
