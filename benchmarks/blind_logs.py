@@ -5,6 +5,7 @@ scale, wind, signs and repeated rows are drawn at random, and `assess` is told n
 docs/answers/blind_logs.md.
 """
 
+import collections
 import math
 import os
 import tempfile
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 import aircraft
 import harness
+from benchmarks.blind_files import FORMATS, Stream
 from harness.files import replacing
 from harness.flight import Flight
 from harness.log import FlightLog
@@ -27,7 +29,7 @@ from harness.plants.plant import Start
 from harness.pool import computed
 from harness.recorded import fitted_plant, response_fit, turn
 from harness.recorded.assessment import CANNOT, LAG, Assessment, assess
-from harness.recorded.recorded_flight import Basis, Channel, LogError, RecordedFlight, sampled
+from harness.recorded.recorded_flight import Basis, Channel, LogError, RecordedFlight
 from harness.recorded.wind import Fit, track_of
 from harness.tables import markdown
 from harness.verdict.parts import PARTS
@@ -46,19 +48,12 @@ SHARES = (0.4, 0.4, 0.2)
 TURN, SCALE, WIND, LAG_ROW = "turn relation", "airspeed scale", "wind", "lag"
 
 
-class Stream(NamedTuple):
-    """The rows of one message: when each was written, s, and its values. SI, rad, signs as in the harness."""
-
-    time: Array
-    basis: Basis
-    values: Mapping[str, Array]
-
-
 @dataclass(frozen=True, slots=True)
 class Hidden:
     """What `assess` is not told."""
 
     kind: str
+    format: str  # of the file
     scale: float  # true airspeed over the logged one
     wind_reversed: bool  # the autopilot's wind points to where it comes from
     bank_reversed: bool
@@ -78,15 +73,9 @@ class BlindLog:
     hidden: Hidden
 
     def recorded(self) -> RecordedFlight:
-        """The log as its reader would hand it on."""
-        channels = {
-            name: sampled(stream.time, values, stream.basis, message)
-            for message, stream in self.streams.items()
-            for name, values in stream.values.items()
-        }
-        return RecordedFlight(
-            name="blind", sources=("blind",), clock="", channels=channels, of_receipt=self.hidden.of_receipt
-        )
+        """The log, written to a file and read back."""
+        with tempfile.TemporaryDirectory() as folder:
+            return FORMATS[self.hidden.format](Path(folder), self.streams, self.hidden.of_receipt)
 
 
 def flight_of(of: np.random.Generator, kind: str) -> Flight:
@@ -139,6 +128,7 @@ def blind_log(seed: int) -> BlindLog:
 def logged(log: FlightLog, kind: str, of: np.random.Generator) -> BlindLog:
     """The flight as messages of an autopilot on board, or of its telemetry."""
     of_receipt = bool(of.random() < 0.5)
+    written = "CSV" if of_receipt else str(of.choice(list(FORMATS)))  # autopilots log on board in their own formats
     link = of.uniform(0.0, 0.8) if of_receipt else 0.0
     attitude = of.uniform(4.0, 20.0) if of_receipt else of.uniform(10.0, 20.0)
     scale, bank_reversed, wind_reversed = of.uniform(0.88, 1.12), bool(of.random() < 0.2), bool(of.random() < 0.4)
@@ -151,9 +141,11 @@ def logged(log: FlightLog, kind: str, of: np.random.Generator) -> BlindLog:
         time = np.arange(of.uniform(0.0, 1.0 / rate), log["time"][-1], 1.0 / rate)
         time += of.uniform(0.0, 0.1 / rate, len(time))
         values = {name: _at(log["time"], column, time, basis) for name, column in columns.items()}
+        if basis is Basis.COMMANDED:
+            return Stream(time + age, basis, values)
         values = {name: column + of.normal(0.0, noise, len(time)) for name, column in values.items()}
         time = time + age
-        if repeated and basis is not Basis.COMMANDED:
+        if repeated:
             rows = np.arange(time[0], time[-1], 1.0 / (of.uniform(1.5, 4.0) * rate))
             latest = np.searchsorted(time, rows, side="right") - 1
             return Stream(rows, basis, {name: column[latest] for name, column in values.items()})
@@ -173,8 +165,12 @@ def logged(log: FlightLog, kind: str, of: np.random.Generator) -> BlindLog:
                       lateral_acceleration=log["lateral_acceleration"] + of.normal(0.0, 0.1)),
         "wind": _wind(log, of, link, -1.0 if wind_reversed else 1.0),
     }  # fmt: skip
+    if written == "DataFlash":  # command and attitude in one message
+        time = streams["attitude"].time
+        streams["command"] = Stream(time, commanded, {"bank_command": _at(log["time"], sign * held, time, commanded)})
     hidden = Hidden(
-        kind=kind, scale=scale, wind_reversed=wind_reversed, bank_reversed=bank_reversed, of_receipt=of_receipt,
+        kind=kind, format=written, scale=scale, wind_reversed=wind_reversed, bank_reversed=bank_reversed,
+        of_receipt=of_receipt,
         turbulent=log.flight.wind.turbulence != "none", turn_ratio=_true_turn_ratio(log),
         wind=(float(log["wind_north"].mean()), float(log["wind_east"].mean())), lag=_true_lag(log, held),
     )  # fmt: skip
@@ -242,6 +238,7 @@ class Answer(NamedTuple):
 
     seed: int
     kind: str
+    format: str
     told: Mapping[str, Told]
     signs_right: bool
     reason: str  # why there is no turn relation; empty where there is one
@@ -306,7 +303,7 @@ def compared(seed: int, hidden: Hidden, found: Assessment) -> Answer:
         or (found.estimated.is_reversed is hidden.wind_reversed or math.hypot(*hidden.wind) < 1.0)
     ) and (relation.word == CANNOT or any("bank: the sign" in note for note in found.notes) is hidden.bank_reversed)
     reason = relation.reason if relation.word == CANNOT else ""
-    return Answer(seed, hidden.kind, told, signs, reason, Gains())
+    return Answer(seed, hidden.kind, hidden.format, told, signs, reason, Gains())
 
 
 def _told(true: float, low: float, high: float) -> Told:
@@ -320,6 +317,8 @@ def page(answers: Sequence[Answer]) -> Iterator[str]:
     yield "Does `harness assess` recover what is hidden in a log?"
     yield ""
     yield "`python -m benchmarks.blind_logs` computes and writes this page (a few minutes)."
+    formats = collections.Counter(answer.format for answer in answers)
+    yield f"The logs are files: {', '.join(f'{count} {name}' for name, count in sorted(formats.items()))}."
     yield "The harness flies its 6-DOF aircraft, in circles, behind a target that turns left and right, or straight"
     yield "ahead, in wind up to a third of the airspeed, a third of the flights in light turbulence, and logs them as"
     yield "an autopilot would. Drawn at random and hidden: the messages' rates and noise, the age of the telemetry, the"
