@@ -265,10 +265,8 @@ def _check(root: ElementTree.Element) -> None:
         declared = set(map(id, section.findall("property")))
         for element in section.iter():
             for written in _written(element, id(element) in declared):
-                if "simulation" in (path := _path(written))[:-1]:
-                    raise _at(element, f"writes {'/'.join(path)}: a model may read what is under simulation/ only")
-                if ".." in path or "." in path:
-                    raise _at(element, f"{written.strip()}: the name of a property may not have . or .. in it")
+                if fault := fault_of(written):
+                    raise _at(element, fault)
             if element.tag == "delay":
                 _check_delay(element)
             for text in (element.text or "", *(value for key, value in element.items() if key != "name")):
@@ -277,6 +275,16 @@ def _check(root: ElementTree.Element) -> None:
     for mass in (each for section in root.iter("mass_balance") for each in section if each.tag in _MASSES):
         if not all(number > 0.0 for number in _numbers(mass.text)):
             raise _at(mass, f"<{mass.tag}> is {(mass.text or '').strip()}, must be above 0")
+
+
+def fault_of(name: str) -> str:
+    """Why nothing may write a property of this name; empty if it may."""
+    path = _path(name)
+    if "simulation" in path[:-1]:
+        return f"writes {'/'.join(path)}: a model may read what is under simulation/ only"
+    if ".." in path or "." in path:
+        return f"{name.strip()}: the name of a property may not have . or .. in it"
+    return ""
 
 
 def _written(element: ElementTree.Element, is_declaration: bool) -> Iterator[str]:
