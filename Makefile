@@ -71,6 +71,7 @@ bench: install  ## the speed of the loop, as ratios in one run, of the laws, of 
 	$(BIN)/python -m benchmarks.recording_speed
 	$(BIN)/python -m benchmarks.runs
 	$(BIN)/python -m benchmarks.maps
+	$(BIN)/python -m benchmarks.compiled
 
 tuned_gains: install  ## whether tune finds the gains of a fine grid: docs/answers/tuned_gains.md (a quarter of an hour)
 	$(BIN)/python -m benchmarks.tuned_gains

@@ -60,7 +60,7 @@ def is_folder(name: str | Path) -> bool:
 def is_recorded(name: str | Path) -> bool:
     """Whether it is the path of a file, with the aircraft of a recorded flight; False for text that is no path."""
     try:
-        return Path(name).suffix == ".toml" and Path(name).is_file()
+        return str(name).endswith(".toml") and Path(name).suffix == ".toml" and Path(name).is_file()
     except (OSError, ValueError):
         return False
 
@@ -180,7 +180,7 @@ def _read(file: Path) -> dict[str, Any]:
 
 def _text(file: Path) -> str:
     try:
-        if file.exists() and not file.is_file():
+        if not file.is_file() and file.exists():
             raise AirframeError(f"{file}: must be a file")
         return file.read_text(encoding="utf-8")
     except OSError as error:

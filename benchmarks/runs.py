@@ -68,14 +68,14 @@ def overhead(few: Matrix, many: Matrix, folder: Path) -> float:
     """Processor seconds of one more flight beside its simulation: of the parent and of its one worker together."""
     costs = []
     for of in (few, many):
-        begin = _used()
+        begin = used()
         for _ in run(of, folder / str(len(of)), Options(workers=1, log="none", fly=timed)):
             pass
-        costs.append(_used() - begin - float(load_results(folder / str(len(of)))["seconds"].sum()))
+        costs.append(used() - begin - float(load_results(folder / str(len(of)))["seconds"].sum()))
     return (costs[1] - costs[0]) / (len(many) - len(few))
 
 
-def _used() -> float:
+def used() -> float:
     """Processor seconds of this process and of those that it started and that have ended."""
     usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)

@@ -36,6 +36,20 @@ def overshoot(error: Array) -> float | None:
     return float(np.abs(beyond).max()) if beyond.size else None
 
 
+def unwrapped(angle: Array) -> Array:
+    """Angles, rad, counted on beyond a whole turn: the bits of `np.unwrap`, without its work where nothing jumps."""
+    step = np.diff(angle)
+    jumps = np.flatnonzero(~(np.abs(step) < math.pi))
+    if not jumps.size:
+        return angle + 0.0
+    jumped = step[jumps]
+    within = np.mod(jumped + math.pi, math.tau) - math.pi
+    within[(within == -math.pi) & (jumped > 0.0)] = math.pi
+    turns = np.zeros(len(angle))
+    turns[jumps + 1] = within - jumped
+    return np.asarray(angle + np.cumsum(turns))
+
+
 def azimuth(north: Array, east: Array) -> Array:
     """The direction of a position, rad, clockwise from north, counted on beyond a whole turn."""
-    return np.unwrap(np.arctan2(east, north))
+    return unwrapped(np.arctan2(east, north))

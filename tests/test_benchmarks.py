@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from benchmarks import flight_speed, help_speed, maps, recording_speed, runs
+from benchmarks import compiled, flight_speed, help_speed, maps, recording_speed, runs
 from tests.builders import drawing
 
 
@@ -63,3 +63,12 @@ def test_recordings_are_timed_until_they_are_drawn(capsys: pytest.CaptureFixture
     written, drawn = lines(capsys)
     assert medians(written)[0] > 0.0
     assert medians(drawn)[0] > 0.0
+
+
+def test_compiled_flights_are_timed_beside_those_of_python(capsys: pytest.CaptureFixture[str]) -> None:
+    compiled.main(pairs=1, flights=24)
+    *plants, matrix, first = lines(capsys)
+    assert len(plants) == 2 * len(compiled.PLANTS)
+    assert all(medians(line) for line in plants)
+    assert " times as fast" in matrix
+    assert first.startswith("the first compiled flight of a process: ")

@@ -13,6 +13,7 @@ from harness.log import FlightLog
 from harness.log.metric import METRICS, YES_OR_NO, measure, window_in_words
 from harness.loop import simulate
 from harness.plants.plant import Outcome
+from harness.series import unwrapped
 from harness.settings.columns import is_setting
 from harness.world.wind import Wind
 from tests.builders import FLIGHT, log_of
@@ -227,3 +228,13 @@ def test_the_name_of_a_metric_ends_with_its_unit_and_is_that_of_no_setting(name:
     ends = [unit for unit, suffix in SUFFIXES.items() if suffix and name.endswith(suffix)]
     assert METRICS[name].unit in (ends or ["1", YES_OR_NO])
     assert not is_setting(name)
+
+
+def test_angles_are_counted_on_with_the_bits_of_numpy() -> None:
+    draws = np.random.default_rng(1)
+    for size in (0, 1, 2, 500):
+        for spread in (0.1, 3.0, 20.0):
+            angle = draws.normal(0.0, spread, size)
+            assert np.array_equal(unwrapped(angle), np.unwrap(angle))
+    edges = np.array([0.0, math.pi, 0.0, -math.pi, math.pi, -0.0, math.nan, 1.0])
+    assert np.array_equal(unwrapped(edges), np.unwrap(edges), equal_nan=True)

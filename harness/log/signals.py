@@ -12,7 +12,7 @@ from harness.chatter import Oscillation, oscillation, rests
 from harness.feasibility import feasibility_margin
 from harness.log.flight_log import FlightLog
 from harness.plants.plant import Outcome
-from harness.series import azimuth, settling_time
+from harness.series import azimuth, settling_time, unwrapped
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Signals:
     @cached_property
     def flown_rate(self) -> Array:
         """Mean heading rate while each of these commands was held, rad/s."""
-        return np.diff(np.unwrap(self.log["heading"])) / self.period
+        return np.diff(unwrapped(self.log["heading"])) / self.period
 
     @cached_property
     def lag_and_gain(self) -> tuple[float | None, float | None]:
