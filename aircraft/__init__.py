@@ -127,6 +127,12 @@ def data(airframe: Path) -> dict[str, Any]:
     return _read(airframe / "airframe.toml")
 
 
+def adopted(airframe: Path) -> dict[str, Any] | None:
+    """How a model that nobody here wrote was adopted, from its data; None for an airframe of the harness's kind."""
+    found = data(airframe).get("adopted")
+    return found if isinstance(found, dict) else None
+
+
 def inner_loop(airframe: Path) -> dict[str, Any]:
     """The gains and limits of an airframe's inner loop. Raises `AirframeError`."""
     return _read(airframe / "inner_loop.toml")

@@ -18,7 +18,8 @@ from autopilot.laws import law
 from harness.flight import Flight, air_of
 from harness.log import COLUMNS
 from harness.loop import simulate
-from harness.plants.sixdof import SixDof, engage, load, trim
+from harness.plants.model import load
+from harness.plants.sixdof import SixDof, engage, trim
 
 AIRFRAMES = ("ultra_stick_25e", "skywalker_x8")
 

@@ -17,8 +17,9 @@ import aircraft
 from aircraft.write_models import jsbsim_model
 from aircraft.write_models import main as write_models
 from harness.checks import airframe_of
+from harness.plants.model import FT, SLUG, ModelError, load
 from harness.plants.plant import Start
-from harness.plants.sixdof import FT, SLUG, ModelError, NoTrimError, engage, load, trim
+from harness.plants.sixdof import NoTrimError, engage, trim
 from harness.world.air import Air
 from tests.builders import copied_airframe, write
 

@@ -17,7 +17,7 @@ import pytest
 from harness import fence
 from harness.child import ChildError, in_child, limited
 from harness.fence import FenceError, checked, fenced
-from harness.plants.sixdof import FT, SLUG
+from harness.plants.model import FT, SLUG
 from tests.builders import ROOT, write
 
 LIBRARY = Path(jsbsim.get_default_root_dir())

@@ -22,8 +22,9 @@ from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.ladder import PLANTS
 from harness.plants.lagged import Lagged
+from harness.plants.model import load, si, write
 from harness.plants.plant import Outcome, PlantError, Start
-from harness.plants.sixdof import Trim, engage, load, si, trim, write
+from harness.plants.sixdof import Trim, engage, trim
 from harness.settings import SettingsError, flight_from_document
 from harness.world.air import Air
 from harness.world.wind import Wind

@@ -178,6 +178,7 @@ CALLS: Mapping[str, Sequence[str]] = {
     "demo": ["--out /dev/null"],
     "reproduce": ["--out /dev/null --workers WORD"],
     "list": ["WORD"],
+    "adopt": ["WORD --out OUT", "AIRFRAME --controls WORD --out OUT", "WORD --max-bank 900"],
     "identify": ["AIRFRAME --airspeed 900 --out OUT", "AIRFRAME --airspeed WORD --out /dev/null", "WORD"],
     "doctor": ["WORD"],
 }  # fmt: skip

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import aircraft
+from harness.plants.model import load
 from harness.plants.plant import Start
-from harness.plants.sixdof import SixDof, load, trim
+from harness.plants.sixdof import SixDof, trim
 from harness.plants.state import State
 from harness.world.air import Air
 from harness.world.wind import Wind

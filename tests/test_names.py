@@ -13,7 +13,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from harness.markup import code, latex, markdown
-from harness.plants.sixdof import ModelError, load
+from harness.plants.model import ModelError, load
 from harness.settings import load_flight
 from tests.builders import copied_airframe, invoke, write
 

@@ -14,8 +14,9 @@ from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.laws import law
 from harness.flight import MetricSettings
 from harness.loop import simulate
+from harness.plants.model import ModelError, load, write
 from harness.plants.plant import End, Outcome, PlantError, Start
-from harness.plants.sixdof import ModelError, SixDof, load, write
+from harness.plants.sixdof import SixDof
 from harness.world.air import Air
 from harness.world.target import Segment, Target
 from harness.world.wind import Wind

@@ -17,8 +17,9 @@ from harness.checks import problems
 from harness.doctor.self_tests import wind_triangle_error
 from harness.flight import Flight, air_of
 from harness.loop import simulate
+from harness.plants.model import load, write
 from harness.plants.plant import End, Outcome, Start
-from harness.plants.sixdof import SixDof, engage, load, trim, write
+from harness.plants.sixdof import SixDof, engage, trim
 from harness.world.air import Air, Array
 from harness.world.randomness import stream
 from harness.world.turbulence import FOOT, Dryden, _gradient, dryden, lag_chain, turbulence

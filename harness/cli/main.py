@@ -61,6 +61,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
         },
         "Airframes and installation": {
             "list": Entry("list:list_", "List the laws, aircraft, plants, metrics, margins or settings."),
+            "adopt": Entry("adopt:adopt", "Make an aircraft of a JSBSim model, with an inner loop of its own."),
             "identify": Entry("identify:identify", "Identify how an airframe follows a heading-rate command."),
             "doctor": Entry("doctor:doctor", "Check this installation: packages, wind, units and the bits of flights."),
         },

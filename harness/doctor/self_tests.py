@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 import aircraft
 from harness.doctor.finding import Finding, Soundness
+from harness.plants.model import load, si
 from harness.plants.plant import Start
-from harness.plants.sixdof import SixDof, load, si, trim
+from harness.plants.sixdof import SixDof, trim
 from harness.world.air import Air
 
 WIND_TOLERANCE = 1e-6  # m/s

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+import aircraft
 from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof
 from harness.plants.state import State
@@ -90,7 +91,10 @@ class Record:
 
 def flown(airframe: Path, airspeed: float, command: Array, rate_trim: bool = True) -> Record:
     """Flies a command, rad/s per step, on the plant sixdof, from trim in still air. Raises `PlantError`, `End`."""
-    flying = SixDof(airframe, STEP, rate_trim).start(Start(airspeed=airspeed, heading=0.0), Air())
+    start = Start(airspeed=airspeed, heading=0.0)
+    if adopted := aircraft.adopted(airframe):
+        start = replace(start, altitude=adopted["altitude"])
+    flying = SixDof(airframe, STEP, rate_trim).start(start, Air())
     states = [flying.state]
     for rate in command.tolist():
         flying.advance(rate, STEP)

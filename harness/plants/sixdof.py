@@ -1,217 +1,39 @@
-"""The plant `sixdof`: a JSBSim airframe under its native inner loop. The only file that imports JSBSim or uses feet.
+"""The plant `sixdof`: a JSBSim airframe under its native inner loop.
 
-In this order: loading a model, trimming it, engaging its inner loop, flying it.
+In this order: trimming a model, engaging its inner loop, flying it.
 """
 
 import math
-import os
-import re
-from collections.abc import Callable
-from copy import deepcopy
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import NamedTuple
-from xml.etree import ElementTree
+from typing import Any, NamedTuple
 
-import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
 import aircraft
-import autopilot
 from autopilot.angles import wrap
-from harness.fence import FenceError, checked
 from harness.flight_errors import Errors
+from harness.plants.model import FT, Fdm, check_body, cross, dot, load, node, place, write
 from harness.plants.plant import End, Outcome, PlantError, Start
 from harness.plants.state import State
 from harness.plants.turn import GRAVITY
+from harness.plants.wind_tunnel import STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
 from harness.world.air import Air, Vector
 
 Array = NDArray[np.float64]
 
-FT = 0.3048  # m
-SLUG = 4.4482216152605 / FT  # kg
-_SI = {"ft": FT, "fps": FT, "sqft": FT**2, "slugs": SLUG, "slugs_ft2": SLUG * FT**2}
-RADIUS = 6371000.0  # m, as in planet.xml
 GROUND = 15.0  # m above the ground: a flight ends below it
 DEPARTURE_BANK = math.radians(80.0)
 STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
-_PLANTS = Path(__file__).parent
-_INNER_LOOP = Path(autopilot.__file__).parent
-_LOOP = "inner_loop"  # as a model names it
-_PROPERTY = re.compile(r"(?<![\w/])[a-z][\w-]*(?:/[\w-]+)+")
-_AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
-
-
-class _LoadLog(jsbsim.FGLogger):
-    """Keeps JSBSim's messages of level WARN and above: the only sign in Python of a model that was read in part."""
-
-    def __init__(self) -> None:
-        self.problems: list[str] = []
-        self._text = ""
-
-    def message(self, message: str) -> None:
-        self._text += message
-
-    def flush(self) -> None:
-        if jsbsim.LogLevel.WARN <= self.log_level <= jsbsim.LogLevel.FATAL:
-            self.problems.append(" ".join(self._text.split()))
-        self._text = ""
-
-
-_load_log = _LoadLog()
-jsbsim.set_logger(_load_log)
-jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # as its stub has it
-
-
-class ModelError(PlantError):
-    """JSBSim cannot load the airframe's model, or the model lacks a property."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__("aircraft", message)
-
-
-def parsed(model: Path) -> ElementTree.Element:
-    """The root of a model, which reads no other file but the inner loop and writes none. Raises `ModelError`.
-
-    What a model includes would be in no flight's key.
-    """
-    try:
-        root = checked(model, systems=(_LOOP,))
-    except FenceError as error:
-        raise ModelError(str(error)) from None
-    for loop in (model.with_name(f"{_LOOP}.xml"), model.parent / "Systems" / f"{_LOOP}.xml"):
-        if os.path.lexists(loop):
-            raise ModelError(f"{loop}: JSBSim would read it instead of the inner loop of the harness: move it away")
-    return root
-
-
-def _properties(model: ElementTree.Element) -> list[str]:
-    """The names of all properties that the model and its inner loop read."""
-    roots = (model, ElementTree.parse(_INNER_LOOP / f"{_LOOP}.xml").getroot())
-    texts = (text for root in roots for text in root.itertext())
-    return sorted({name for text in texts for name in _PROPERTY.findall(text)})
+_NO_ERRORS = Errors()
 
 
 class NoTrimError(ValueError):
     """There is no steady level flight at this airspeed."""
-
-
-_NO_ERRORS = Errors()
-
-
-def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> jsbsim.FGFDMExec:
-    """A new JSBSim with this airframe and its inner loop, stepping by `step` seconds. Raises `ModelError`.
-
-    Errors of the aircraft are in a copy of its model: JSBSim lets nobody set mass or lags of a loaded one.
-    """
-    if not errors.of_aircraft:
-        return _load(airframe, step)
-    with TemporaryDirectory(prefix="harness-") as folder:
-        copy = Path(folder) / airframe.name
-        copy.mkdir()
-        model = deepcopy(parsed(aircraft.model(airframe)))
-        _alter(model, errors)
-        ElementTree.ElementTree(model).write(aircraft.model(copy), encoding="utf-8")
-        return _load(copy, step)
-
-
-def _alter(model: ElementTree.Element, errors: Errors) -> None:
-    """Puts the errors of the aircraft into its model. Raises `ModelError` for one that `make models` did not write."""
-
-    def found(path: str) -> ElementTree.Element:
-        if (element := model.find(path)) is None:
-            raise ModelError(f"{model.get('name')}: no {path} in the model, for an error of the aircraft")
-        return element
-
-    def number(path: str) -> float:
-        return float(found(path).text or "nan")
-
-    found("mass_balance/emptywt").text = repr(errors.mass_scale * number("mass_balance/emptywt"))
-    x = "mass_balance/location[@name='CG']/x"  # metres aft, as the chord
-    found(x).text = repr(number(x) + errors.cg_aft * number("metrics/chord"))
-    if not errors.actuator_lag:
-        return
-    channel = found("flight_control/channel")
-    for i, surface in enumerate(("elevator", "aileron", "rudder")):
-        before, late = f"inner-loop/{surface}-rad", f"actuators/late-{surface}-rad"
-        commanded = [element for element in channel.iter("input") if (element.text or "").strip() == before]
-        if commanded:
-            lag = ElementTree.Element("lag_filter", name=late)
-            ElementTree.SubElement(lag, "input").text = before
-            ElementTree.SubElement(lag, "c1").text = repr(1.0 / errors.actuator_lag)
-            channel.insert(i, lag)
-        for element in commanded:
-            element.text = late
-
-
-def _load(airframe: Path, step: float) -> jsbsim.FGFDMExec:
-    model = parsed(aircraft.model(airframe))
-    _load_log.problems.clear()
-    fdm = jsbsim.FGFDMExec(None)
-    fdm.set_dt(step)  # before the model: its components keep the step they were made with
-    try:
-        loaded = fdm.load_planet(_text(_PLANTS / "planet.xml"), False) and fdm.load_model_with_paths(
-            _text(Path(airframe.name)), _text(airframe.parent), _text(airframe), _text(_INNER_LOOP), True
-        )
-    except RuntimeError as error:  # also what the C++ library throws besides JSBSim's own BaseError
-        raise ModelError(f"{aircraft.model(airframe)}: {' '.join(str(error).split())}") from error
-    if not loaded or _load_log.problems:
-        raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
-    missing = [name for name in _properties(model) if not fdm.get_property_manager().hasNode(name)]
-    if missing:
-        for name in missing:  # JSBSim ends the whole process when it reads, or merely drops, an unknown property
-            fdm[name] = 0.0
-        raise ModelError(f"{aircraft.model(airframe)}: unknown properties {', '.join(missing)}")
-    for integrator in ("rate", "position"):
-        write(fdm, f"simulation/integrator/{integrator}/rotational", _AB2)
-    return fdm
-
-
-def check_body(fdm: jsbsim.FGFDMExec) -> None:
-    """Raises `ModelError` for a mass or a tensor of inertia that no body has: JSBSim would fly it all the same.
-
-    JSBSim computes the inertia in `run_ic()`.
-    """
-    mass = SLUG * fdm["inertia/mass-slugs"]
-    if not 0.0 < mass < math.inf:
-        raise ModelError(f"the mass of the model is {mass:g} kg, must be above 0")
-    inertia = {x: SLUG * FT**2 * fdm[f"inertia/{x}-slugs_ft2"] for x in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
-    ixx, iyy, izz, ixy, ixz, iyz = inertia.values()
-    minors = ixx, ixx * iyy - ixy**2, _dot((ixx, -ixy, -ixz), _cross((-ixy, iyy, -iyz), (-ixz, -iyz, izz)))
-    if not all(0.0 < minor < math.inf for minor in minors):
-        told = ", ".join(f"{name} {value:.3g}" for name, value in inertia.items())
-        raise ModelError(
-            f"no body has the moments of inertia of the model, {told} kg m²: they must be positive definite"
-        )
-
-
-def _text(path: Path) -> str:
-    """The path as JSBSim takes it: text, whose bytes in UTF-8 are the name. Raises `ModelError`."""
-    try:
-        return os.fsencode(path).decode()
-    except UnicodeDecodeError:
-        raise ModelError(f"{path}: the name is not text in UTF-8, which JSBSim needs: rename the folder") from None
-
-
-def write(fdm: jsbsim.FGFDMExec, name: str, value: float) -> None:
-    """Sets an existing property, in JSBSim's unit. `ModelError` for an unknown name, which JSBSim would create."""
-    _node(fdm, name).set_double_value(value)
-
-
-def si(fdm: jsbsim.FGFDMExec, name: str) -> float:
-    """A property in SI: the suffix of its name gives the unit. rad and dimensionless numbers stay as they are."""
-    return fdm[name] * _SI.get(name.rpartition("-")[2], 1.0)
-
-
-def _node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
-    node = fdm.get_property_manager().get_node(name)
-    if node is None:
-        raise ModelError(f"the model has no property {name!r}")
-    return node
 
 
 _NUDGE = 1e-5  # rad, or of the throttle
@@ -225,14 +47,15 @@ class Trim(NamedTuple):
     throttle: float
 
 
-def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
+def trim(fdm: Fdm, start: Start, air: Air) -> Trim:
     """Puts the aircraft at `start`, level and unaccelerated in the wind there, and returns its trim.
 
     Newton's method on the accelerations that JSBSim computes. It places the surfaces directly: the actuators do not run
     before the inner loop is engaged, so their lag cannot falsify the result. Raises `NoTrimError` without a solution,
     `ModelError` for what is no body.
     """
-    _place(fdm, start, air.horizontal(0))
+    place(fdm, start, air.horizontal(0))
+    _connect(fdm, False)
     x = Trim(pitch=0.05, elevator=0.0, throttle=0.5)
     for _ in range(30):
         residual = _accelerations(fdm, x)
@@ -249,7 +72,7 @@ def trim(fdm: jsbsim.FGFDMExec, start: Start, air: Air) -> Trim:
     return x
 
 
-def _slope(fdm: jsbsim.FGFDMExec, x: Trim, i: int, residual: Vector) -> Vector:
+def _slope(fdm: Fdm, x: Trim, i: int, residual: Vector) -> Vector:
     """The derivative of the accelerations by the i-th unknown, a forward difference."""
     u, w, q = _accelerations(fdm, Trim._make(v + _NUDGE * (i == j) for j, v in enumerate(x)))
     return (u - residual[0]) / _NUDGE, (w - residual[1]) / _NUDGE, (q - residual[2]) / _NUDGE
@@ -257,41 +80,11 @@ def _slope(fdm: jsbsim.FGFDMExec, x: Trim, i: int, residual: Vector) -> Vector:
 
 def _solve(a: Vector, b: Vector, c: Vector, r: Vector) -> Vector:
     """Solves [a b c] x = r by Cramer's rule: the same bits on every machine, unlike a linear algebra library."""
-    det = _dot(a, _cross(b, c)) or math.nan
-    return _dot(r, _cross(b, c)) / det, _dot(a, _cross(r, c)) / det, _dot(a, _cross(b, r)) / det
+    det = dot(a, cross(b, c)) or math.nan
+    return dot(r, cross(b, c)) / det, dot(a, cross(r, c)) / det, dot(a, cross(b, r)) / det
 
 
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _place(fdm: jsbsim.FGFDMExec, start: Start, wind: tuple[float, float]) -> None:
-    """Writes the initial condition in the order that JSBSim needs: attitude, wind, then velocity over the ground.
-
-    The flight starts on the equator, where the direction of north changes least along the way.
-    """
-    W_x, W_y = wind
-    write(fdm, "ic/lat-geod-rad", 0.0)
-    write(fdm, "ic/long-gc-rad", 0.0)
-    write(fdm, "ic/h-sl-ft", start.altitude / FT)
-    write(fdm, "ic/phi-rad", 0.0)
-    write(fdm, "ic/theta-rad", 0.0)
-    write(fdm, "ic/psi-true-rad", start.heading)
-    write(fdm, "ic/vw-mag-fps", math.hypot(W_x, W_y) / FT)
-    write(fdm, "ic/vw-dir-deg", math.degrees(math.atan2(W_y, W_x)))
-    write(fdm, "ic/vn-fps", (start.airspeed * math.cos(start.heading) + W_x) / FT)
-    write(fdm, "ic/ve-fps", (start.airspeed * math.sin(start.heading) + W_y) / FT)
-    write(fdm, "ic/vd-fps", 0.0)
-    ahead = start.airspeed + W_x * math.cos(start.heading) + W_y * math.sin(start.heading)
-    write(fdm, "ic/q-rad_sec", -ahead / RADIUS)  # level flight over a sphere pitches down with it
-    _connect(fdm, False)
-
-
-def _accelerations(fdm: jsbsim.FGFDMExec, x: Trim) -> Vector:
+def _accelerations(fdm: Fdm, x: Trim) -> Vector:
     """(u', w', q') in m/s^2, m/s^2, rad/s^2 at this pitch, elevator and throttle."""
     fdm["ic/theta-rad"] = x.pitch
     fdm["fcs/elevator-pos-rad"] = x.elevator
@@ -304,12 +97,19 @@ def _accelerations(fdm: jsbsim.FGFDMExec, x: Trim) -> Vector:
     )
 
 
-def engage(fdm: jsbsim.FGFDMExec, trimmed: Trim, start: Start, rate_trim: bool) -> None:
+def engage(fdm: Fdm, trimmed: Trim, start: Start, rate_trim: bool) -> None:
     """Hands the trimmed aircraft to its inner loop, which holds this altitude and airspeed.
 
     A JSBSim actuator or filter without a past takes its first input at once, past its lag and rate limit. So each runs
     a first time here, in trim and with time at rest: what it takes is the trim.
     """
+    command(fdm, trimmed, start, rate_trim)
+    _connect(fdm, True)
+    fdm.run_ic()
+
+
+def command(fdm: Fdm, trimmed: Trim, start: Start, rate_trim: bool) -> None:
+    """Tells the inner loop the trim, and what it shall hold."""
     write(fdm, "inner-loop/trim/pitch-rad", trimmed.pitch)
     write(fdm, "inner-loop/trim/pitch-rate-rad_s", fdm["velocities/q-rad_sec"])  # level on a sphere turns down with it
     write(fdm, "inner-loop/trim/elevator-rad", trimmed.elevator)
@@ -318,11 +118,9 @@ def engage(fdm: jsbsim.FGFDMExec, trimmed: Trim, start: Start, rate_trim: bool) 
     write(fdm, "inner-loop/command/airspeed-mps", start.airspeed)
     write(fdm, "inner-loop/command/heading-rate-rad_s", 0.0)
     write(fdm, "inner-loop/rate-trim", float(rate_trim))
-    _connect(fdm, True)
-    fdm.run_ic()
 
 
-def _connect(fdm: jsbsim.FGFDMExec, connected: bool) -> None:
+def _connect(fdm: Fdm, connected: bool) -> None:
     """Whether the inner loop and the actuators run."""
     write(fdm, "inner-loop/engaged", float(connected))
     write(fdm, "actuators/engaged", float(connected))
@@ -375,6 +173,11 @@ class SixDof:
             raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
         limits = aircraft.limits(self.airframe)
         fdm = load(self.airframe, self.step, self.errors)
+        if adopted := aircraft.adopted(self.airframe):
+            self._engage_adopted(fdm, adopted, start, air)
+            return _SixDofFlying(
+                fdm, self.step, start, air, limits.stall, _blower(fdm, air) if len(air.gusts) else None
+            )
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:
@@ -389,21 +192,41 @@ class SixDof:
             _connect(fdm, True)
         return _SixDofFlying(fdm, self.step, start, air, limits.stall, blow)
 
+    def _engage_adopted(self, fdm: Fdm, adopted: Mapping[str, Any], start: Start, air: Air) -> None:
+        """Trims an adopted model in the wind tunnel, hands it to its inner loop, and lets it fly."""
+        tunnel = WindTunnel(fdm, Controls.of(adopted["controls"]), start, self.step, air.horizontal(0))
+        try:
+            tunnel.start_engines()
+            tunnel.setting = TrimPoint(**adopted["trim"])
+            if not tunnel.trim() < STEADY:
+                raise PlantError(
+                    "start.airspeed", f"no level trim at {start.airspeed:g} m/s, {start.altitude:g} m high"
+                )
+        except NotFiniteError as error:
+            raise PlantError("start.airspeed", f"{self.airframe.name}: {error}") from None
+        trimmed = tunnel.setting
+        write(fdm, "adopted/trim/aileron-norm", trimmed.aileron)
+        write(fdm, "adopted/trim/rudder-norm", trimmed.rudder)
+        command(fdm, Trim(trimmed.pitch, trimmed.elevator, trimmed.throttle), start, self.rate_trim)
+        _connect(fdm, True)
+        fdm.run()  # filters of the inner loop take their first input
+        tunnel.release()
 
-def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
+
+def _blower(fdm: Fdm, air: Air) -> Callable[[], None]:
     """A function that puts the next gust and rotation of the air into JSBSim; to be called before each `run()`.
 
     The values are those at the end of the step that `run()` then makes. JSBSim's own steady wind is the
     horizontal wind at the start, in which the aircraft was trimmed: gusts are the difference to it.
     """
     set_x, set_y, set_z, roll, pitch, yaw = (
-        _node(fdm, name).set_double_value
+        node(fdm, name).set_double_value
         for name in (
             *(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down")),
             *(f"gust/{axis}-rad_sec" for axis in "pqr"),
         )
     )
-    height, heading = (_node(fdm, name).get_double_value for name in ("position/h-sl-ft", "attitude/psi-rad"))
+    height, heading = (node(fdm, name).get_double_value for name in ("position/h-sl-ft", "attitude/psi-rad"))
     (shear_x, shear_y), level = air.shear, air.altitude / FT
     met_x, met_y, _ = air.gust(0)
     table = np.column_stack([(air.gusts - (met_x, met_y, 0.0)) / FT, air.rotation(FT * fdm["metrics/bw-ft"])])
@@ -428,7 +251,7 @@ def _blower(fdm: jsbsim.FGFDMExec, air: Air) -> Callable[[], None]:
 class _SixDofFlying:
     def __init__(
         self,
-        fdm: jsbsim.FGFDMExec,
+        fdm: Fdm,
         step: float,
         start: Start,
         air: Air,
@@ -438,9 +261,9 @@ class _SixDofFlying:
         self.fdm = fdm
         self._run: Callable[[], bool] = fdm.run
         self._blow = blow
-        self._readers = [_node(fdm, name).get_double_value for name in _READ]
+        self._readers = [node(fdm, name).get_double_value for name in _READ]
         self._velocity_north, self._velocity_east = self._readers[2:4]
-        self._command = _node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
+        self._command = node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
         self._step = step
         self._north, self._east = start.position
         self._wind, self._at_start = air.steady, air.horizontal(0)
@@ -553,8 +376,8 @@ def replay(airframe: Path, step: float, begin: Moment, commands: Array) -> Array
     write(fdm, "ic/long-gc-rad", 0.0)
     for (name, unit), value in zip(_BEGUN_AT, begin, strict=True):
         write(fdm, name, value / unit)
-    setters = [_node(fdm, name).set_double_value for name, _ in _SET]
-    readers = [_node(fdm, name).get_double_value for name in _SEEN]
+    setters = [node(fdm, name).set_double_value for name, _ in _SET]
+    readers = [node(fdm, name).get_double_value for name in _SEEN]
     rows = (commands / [unit for _, unit in _SET]).tolist()
     seen: Array = np.full((len(rows), len(_SEEN)), math.nan)
     for i, row in enumerate(rows):

@@ -1,0 +1,279 @@
+"""Adopts a JSBSim model, stage by stage: each says what it found, or why the model cannot be flown."""
+
+import math
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from harness.adoption.adoption import STANDARD, STEP, Adoption, Wish, motion, write
+from harness.adoption.design import designed
+from harness.adoption.linear import linearised
+from harness.adoption.manoeuvres import circled, law_of, turned
+from harness.adoption.model import named, source, writers
+from harness.adoption.refusal import RefusalError
+from harness.child import MEMORY, ChildError, limited
+from harness.files import make_folder, write_text
+from harness.plants.model import FT, SLUG, ModelError, check_body, load, unknown
+from harness.plants.plant import PlantError
+from harness.plants.turn import GRAVITY
+from harness.plants.wind_tunnel import STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
+
+SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0)  # times that of the lift coefficient below
+LIFT_COEFFICIENT = 0.5
+SECONDS = 60.0  # that a stage may take
+_THROTTLES = (0.15, 0.4, 0.65, 0.9)
+_MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # of a command in trim
+
+Found = tuple[Adoption, str]
+_FILES = ("{name}.xml", "airframe.toml", "inner_loop.toml", "identified.toml", "circle.toml")
+
+
+def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
+    """Adopts the model `name` into the folder out/NAME; yields (stage, what it found). Raises `RefusalError`, OSError.
+
+    Each stage runs in a process of its own. The folder is written when all stages are through.
+    """
+    model = source(name)
+    left_out = f", {len(model.fenced.left_out)} left out" if model.fenced.left_out else ""
+    yield "guard", f"{len(model.fenced.sources)} files, {sum(1 for _ in model.root.iter())} elements{left_out}"
+    with tempfile.TemporaryDirectory(prefix="harness-") as temporary:
+        folder = Path(temporary) / model.name
+        folder.mkdir()
+        adoption = Adoption(
+            name=model.name,
+            wish=wish,
+            folder=folder,
+            names=frozenset(named(model.root)),
+            writers=writers(model.root),
+        )
+        for stage, work in STAGES.items():
+            write(adoption, model)
+            try:
+                adoption, line = limited(stage, SECONDS, MEMORY, work, adoption)
+            except ChildError as error:
+                raise RefusalError(stage, error.cause) from None
+            except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
+                raise RefusalError(stage, " ".join(str(error).split())) from None
+            yield stage, line
+        write(adoption, model)
+        kept = out / model.name
+        make_folder(kept)
+        for pattern in _FILES:
+            if (file := folder / pattern.format(name=model.name)).exists():
+                write_text(kept / file.name, file.read_text(encoding="utf-8"))
+
+
+def _load(a: Adoption) -> Found:
+    fdm = load(a.folder, STEP)
+    invented = tuple(sorted(unknown(fdm, a.names)))
+    for missing in invented:
+        fdm[missing] = 0.0
+    engines = int(fdm.get_propulsion().get_num_engines())
+    throttles = tuple(f"fcs/throttle-cmd-norm[{i}]" for i in range(max(1, engines)))
+    controls = Controls.of({**_table(replace(STANDARD, throttles=throttles)), **(a.wish.controls or {})})
+    fdm.run_ic()
+    check_body(fdm)
+    mass, area = SLUG * fdm["inertia/mass-slugs"], FT**2 * fdm["metrics/Sw-sqft"]
+    if not area > 0.0:
+        raise RefusalError("load", f"the wing has an area of {area:g} m^2")
+    a = replace(
+        a, invented=invented, controls=controls, mass=mass, area=area, span=FT * fdm["metrics/bw-ft"],
+        chord=FT * fdm["metrics/cbarw-ft"],
+    )  # fmt: skip
+    return a, f"{len(invented)} properties invented, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
+
+
+def _table(controls: Controls) -> dict[str, object]:
+    return {
+        "elevator": controls.elevator,
+        "aileron": controls.aileron,
+        "rudder": controls.rudder,
+        "throttle": list(controls.throttles),
+    }
+
+
+def _tunnel(a: Adoption) -> WindTunnel:
+    """A new aircraft in the wind tunnel, its engines running."""
+    tunnel = WindTunnel(load(a.folder, STEP), a.controls, a.start, STEP)
+    tunnel.setting = a.setting
+    tunnel.start_engines()
+    return tunnel
+
+
+def _engine(a: Adoption) -> Found:
+    density = 1.225 * (1.0 - 2.2558e-5 * a.wish.altitude) ** 4.2559
+    slow = math.sqrt(2.0 * a.mass * GRAVITY / (density * a.area * LIFT_COEFFICIENT))
+    a = replace(a, start=replace(a.start, airspeed=a.wish.airspeed or slow, altitude=a.wish.altitude))
+    tunnel = _tunnel(a)
+    if not tunnel.engines:
+        raise RefusalError("engine", "no engine: a glider cannot hold its height")
+    thrusts = []
+    for throttle in (0.2, 1.0):
+        tunnel.setting = tunnel.setting._replace(throttle=throttle)
+        tunnel.command()
+        tunnel.settled(longest=10.0)
+        thrusts.append(tunnel.thrust)
+    low, high = thrusts
+    if high - low < 1e-3 * a.mass * GRAVITY:
+        raise RefusalError("engine", f"throttle has no effect: thrust {low:.3g} N at 0.2 and {high:.3g} N at 1")
+    told = f"{tunnel.engines} running, thrust {low:.3g} N at throttle 0.2, {high:.3g} N at 1"
+    return replace(a, engine=told), told
+
+
+def _controls(a: Adoption) -> Found:
+    """Whether each command moves the aircraft as it must; otherwise one that does, among those that there are."""
+    tunnel = _tunnel(a)
+    told = []
+    for surface, axis in (("elevator", 4), ("aileron", 3), ("rudder", 5)):
+        name = getattr(a.controls, surface)
+        effect = _effect(tunnel, name, axis)
+        if effect < 0.01 and surface not in (a.wish.controls or {}):
+            known = _commands(a)
+            effects = {other: _effect(tunnel, other, axis) for other in known}
+            best = max(effects, key=lambda other: effects[other], default=name)
+            if effects.get(best, 0.0) > max(0.01, effect):
+                name, effect = best, effects[best]
+                a = replace(a, controls=Controls.of({**_table(a.controls), surface: name}))
+        if effect < 0.01 and surface != "rudder":
+            raise RefusalError("controls", f"{name} moves nothing: {effect:.2g} rad/s^2{_whose(a, name)}")
+        told.append(f"{surface} {effect:.2g}")
+    return a, f"{', '.join(told)} rad/s^2 of the whole travel"
+
+
+def _whose(a: Adoption, name: str) -> str:
+    writer = a.writers.get(name)
+    return f"; {writer} writes it too" if writer else ": use --controls"
+
+
+def _commands(a: Adoption) -> list[str]:
+    """Properties of the model that may command a surface."""
+    return sorted(name for name in a.names if "cmd" in name and "throttle" not in name and "trim" not in name)
+
+
+def _effect(tunnel: WindTunnel, name: str, axis: int) -> float:
+    """The angular acceleration that 0.3 of the command's travel makes, of the whole travel."""
+    tunnel.at()
+    seen = []
+    for value in (0.3, -0.3):
+        tunnel.fdm[name] = value
+        seen.append(tunnel.settled(longest=3.0)[axis])
+    tunnel.fdm[name] = 0.0
+    tunnel.settled(longest=3.0)
+    return abs(float(seen[0] - seen[1])) / 0.6
+
+
+def _trim(a: Adoption) -> Found:
+    speeds = [a.start.airspeed] if a.wish.airspeed else [a.start.airspeed * share for share in SPEEDS]
+    tunnel = _tunnel(a)
+    best, why = math.inf, ""
+    for speed in speeds:
+        tunnel.start = replace(a.start, airspeed=speed)
+        left, reason = _trimmed(tunnel)
+        if not reason:
+            s = tunnel.setting
+            return replace(a, start=tunnel.start, setting=s), (
+                f"{speed:.1f} m/s, pitch {math.degrees(s.pitch):.1f} deg, bank {math.degrees(s.bank):.2f} deg, "
+                f"elevator {s.elevator:.2f}, aileron {s.aileron:.2f}, rudder {s.rudder:.2f}, "
+                f"throttle {s.throttle:.2f}; {left:.1e} m/s^2 or rad/s^2 is left"
+            )
+        if left < best:
+            best, why = left, f"{speed:.0f} m/s: {reason}"
+    tried = f"from {min(speeds):.0f} to {max(speeds):.0f} m/s" if len(speeds) > 1 else "there"
+    raise RefusalError("trim", f"no level flight {tried}; nearest at {why}")
+
+
+def _trimmed(tunnel: WindTunnel) -> tuple[float, str]:
+    """Trims in stages; returns the largest acceleration that is left, and why it is no trim, or nothing."""
+    tunnel.setting = TrimPoint()
+    tunnel.solve(("pitch", "elevator"), (2, 4), 8, 5e-3)
+    pushes = []
+    for throttle in _THROTTLES:
+        tunnel.setting = tunnel.setting._replace(throttle=throttle)
+        pushes.append(float(tunnel.at()[0]))
+    if pushes[-1] > pushes[0]:
+        throttle = float(np.clip(np.interp(0.0, pushes, _THROTTLES), 0.05, 0.95))
+        tunnel.setting = tunnel.setting._replace(throttle=throttle)
+    tunnel.solve(("pitch", "elevator", "throttle"), (0, 2, 4), 8, 2e-3)
+    tunnel.solve(("bank", "aileron", "rudder"), (1, 3, 5), 8, 2e-3)
+    left = tunnel.trim()
+    if not left < STEADY:
+        if max(pushes) < 0.0:
+            return left, f"short by {-max(pushes) / GRAVITY:.2g} g at throttle {_THROTTLES[-1]:g}"
+        return left, f"an acceleration of {left:.2g} m/s^2 or rad/s^2 is left"
+    for name, most in _MOST.items():
+        if abs(value := getattr(tunnel.setting, name)) > most:
+            return left, f"{name} {value:.2f}, at most {most:g}"
+    return left, ""
+
+
+def _linearise(a: Adoption) -> Found:
+    tunnel = _tunnel(a)
+    tunnel.at()
+    a = replace(a, linear=linearised(tunnel), stall=_stall(tunnel))
+    assert a.linear is not None
+    m = motion(a.linear)
+    lags = ", ".join(f"{name} {m[f'{name}_lag']:.2g} s" for name in ("elevator", "aileron", "rudder", "throttle"))
+    return a, (
+        f"roll {m['roll_time']:.3g} s, dutch roll {m['dutch_roll']:.3g} rad/s ({m['dutch_roll_damping']:.2f}), short "
+        f"period {m['short_period']:.3g} rad/s ({m['short_period_damping']:.2f}), aileron {m['aileron_effect']:.3g} "
+        f"rad/s^2, lags: {lags}; stall {math.degrees(a.stall):.0f} deg"
+    )
+
+
+def _stall(tunnel: WindTunnel) -> float:
+    """The angle of attack, rad, at which lift is greatest; 30 deg where it grows up to there."""
+    setting = tunnel.setting
+    alphas, lifts = [], []
+    for alpha in np.arange(setting.pitch, math.radians(30.0), math.radians(1.0)).tolist():
+        tunnel.setting = setting._replace(pitch=alpha)
+        tunnel.command()
+        tunnel.place()
+        u, _, w = tunnel.accelerations[:3].tolist()
+        alphas.append(alpha)
+        lifts.append(u * math.sin(alpha) - w * math.cos(alpha))
+        if lifts[-1] < max(lifts) - 0.5:
+            break
+    tunnel.setting = setting
+    return float(alphas[int(np.argmax(lifts))])
+
+
+def _design(a: Adoption) -> Found:
+    assert a.linear is not None
+    wanted = math.inf if a.wish.bandwidth is None else a.wish.bandwidth
+    g = designed(a.linear, a.setting._asdict(), a.stall, a.wish.max_bank, wanted)
+    law = law_of(a.start.airspeed, a.wish.max_bank, g.gain["rate-trim-model-per-s"])
+    told = f"bank loop {g.bandwidth:.2g} rad/s, limited by {g.limited_by}; least damping {g.damping:.2f}"
+    return replace(a, gains=g, law=law), told
+
+
+def _turn(a: Adoption) -> Found:
+    assert a.gains is not None
+    lag = 1.0 / a.gains.gain["rate-trim-model-per-s"]
+    t = turned(a.folder, a.start, STEP, a.wish.max_bank, lag)
+    if faults := t.faults(a.start.airspeed):
+        raise RefusalError("90 deg", "; ".join(faults))
+    return a, (
+        f"course within {math.degrees(t.error):.2f} deg, overshoot {math.degrees(t.overshoot):.1f} deg, course rate "
+        f"{t.rate:.3f} of the command, altitude {t.altitude:.1f} m, sideslip {math.degrees(t.sideslip):.1f} deg"
+    )
+
+
+def _circle(a: Adoption) -> Found:
+    assert a.law is not None
+    c = circled(a.folder, a.start, STEP, a.law)
+    if faults := c.faults(a.start.airspeed):
+        raise RefusalError("circle", f"radius {a.law['standoff_m']:g} m: {'; '.join(faults)}")
+    w = circled(a.folder, a.start, STEP, a.law, 0.3 * a.start.airspeed)
+    return a, (
+        f"radius {a.law['standoff_m']:g} m, error {100 * c.error:.2f} % rms over the last lap, altitude "
+        f"{c.altitude:.1f} m, sideslip {math.degrees(c.sideslip):.1f} deg; in wind of 0.3 V {100 * w.error:.2f} %"
+    )
+
+
+STAGES: Mapping[str, Callable[[Adoption], Found]] = {
+    "load": _load, "engine": _engine, "controls": _controls, "trim": _trim, "linearise": _linearise,
+    "design": _design, "90 deg": _turn, "circle": _circle,
+}  # fmt: skip

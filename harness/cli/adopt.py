@@ -1,0 +1,93 @@
+"""`harness adopt`: an aircraft from a JSBSim model that nobody here wrote."""
+
+import math
+from pathlib import Path
+
+import click
+
+from harness.cli._paths import PATH
+
+
+@click.command()
+@click.argument("model")
+@click.option("--airspeed", type=click.FloatRange(min=1.0, max=1e4), help="m/s. [default: found from the lift]")
+@click.option("--altitude", type=click.FloatRange(min=20.0, max=3e4), default=1000.0, show_default=True, help="m.")
+@click.option(
+    "--max-bank", type=click.FloatRange(min=5.0, max=60.0), default=35.0, show_default=True, help="Degrees, in turns."
+)
+@click.option(
+    "--bandwidth",
+    type=click.FloatRange(min=0.05, max=100.0),
+    help="rad/s, wanted of the bank's loop. [default: what the aircraft allows]",
+)
+@click.option("--controls", type=PATH, help="A TOML file: elevator, aileron, rudder and throttle, names of properties.")
+@click.option("--out", type=PATH, default=Path(), show_default=True, help="Where the aircraft's folder is written.")
+def adopt(
+    model: str,
+    airspeed: float | None,
+    altitude: float,
+    max_bank: float,
+    bandwidth: float | None,
+    controls: Path | None,
+    out: Path,
+) -> None:
+    """Make an aircraft of a JSBSim model, with an inner loop of its own.
+
+    MODEL is a file, or the name of a model that comes with JSBSim. Starts its engines, trims it, measures its
+    derivatives, designs gains by one rule for all aircraft, and flies a change of course by 90 deg and a circle. When
+    all of it succeeds, the folder OUT/NAME is written: `aircraft = "OUT/NAME"` then flies it, and circle.toml in it is
+    an experiment to begin with. Otherwise the stage says why, and the exit code is 1.
+
+    \b
+    Examples:
+      harness adopt c172p
+      harness adopt my_models/glider_tug.xml --airspeed 40 --out aircraft
+      harness adopt f16 --bandwidth 1.5
+    """
+    from harness.adoption.adopt import adopt as stages
+    from harness.adoption.adoption import Wish
+    from harness.adoption.refusal import RefusalError
+    from harness.cli._input import BadInput
+    from harness.cli._paths import writable_folder
+
+    names = _controls(controls) if controls else None
+    writable_folder(out)
+    wish = Wish(
+        airspeed=airspeed,
+        altitude=altitude,
+        max_bank=math.radians(max_bank),
+        bandwidth=bandwidth,
+        controls=names,
+    )
+    try:
+        for stage, found in stages(model, out, wish):
+            click.echo(f"{stage:<10} {found}")
+    except RefusalError as error:
+        if error.stage == "guard":
+            raise BadInput(str(error)) from None
+        click.echo(f"not adopted: {error}", err=True)
+        raise SystemExit(1) from None
+    name = Path(model).stem
+    click.echo(f'adopted: aircraft = "{out / name}"; try harness fly {out / name / "circle.toml"}')
+
+
+def _controls(file: Path) -> dict[str, object]:
+    """The names of properties in the file. Raises `BadInput`."""
+    import tomllib
+
+    from harness.cli._input import BadInput
+
+    allowed = ("elevator", "aileron", "rudder", "throttle")
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(f"--controls: {file}: {error.strerror}") from None
+    except ValueError as error:
+        raise BadInput(f"--controls: {file}: {error}") from None
+    for name, value in table.items():
+        if name not in allowed:
+            raise BadInput(f"--controls: {file}: {name} is not one of {', '.join(allowed)}")
+        texts = value if isinstance(value, list) and name == "throttle" else [value]
+        if not texts or not all(isinstance(text, str) and text.strip() for text in texts):
+            raise BadInput(f"--controls: {file}: {name} must be the name of a property")
+    return table

@@ -1,0 +1,90 @@
+"""Adoption: a JSBSim model that nobody here wrote gets an inner loop and flies, or is refused for its true cause."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+
+import aircraft
+from harness.plants.model import data_root
+from harness.settings import load_flight
+from tests.builders import invoke, write
+
+
+@pytest.fixture(scope="module")
+def adopted(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """What `harness adopt c172p` says, and the folder that it writes."""
+    out = tmp_path_factory.mktemp("adopted")
+    said = invoke("adopt", "c172p", "--out", out)
+    assert said.exit_code == 0, said.output
+    return said.output, out / "c172p"
+
+
+def test_an_aircraft_is_adopted_stage_by_stage_and_its_motion_is_that_of_a_cessna_172(
+    adopted: tuple[str, Path],
+) -> None:
+    said, folder = adopted
+    stages = ["guard", "load", "engine", "controls", "trim", "linearise", "design", "90 deg", "circle"]
+    assert [line for line in stages if f"\n{line:<10} " in f"\n{said}"] == stages
+    limits, motion = aircraft.limits(folder), aircraft.data(folder)["adopted"]["motion"]
+    assert limits.design_airspeed == pytest.approx(43.1, abs=0.5)
+    assert motion["roll_time"] == pytest.approx(0.18, abs=0.02)
+    assert motion["dutch_roll"] == pytest.approx(2.0, abs=0.1)
+    assert motion["dutch_roll_damping"] == pytest.approx(0.20, abs=0.03)
+
+
+def test_an_adopted_aircraft_flies_the_experiment_that_was_written_for_it(adopted: tuple[str, Path]) -> None:
+    _, folder = adopted
+    flown = invoke("fly", folder / "circle.toml", "--json")
+    assert flown.exit_code == 0, flown.output
+    flight = load_flight(folder / "circle.toml")
+    metrics = json.loads(flown.stdout)["metrics"]
+    assert metrics["range_error_rms_m"] < 0.015 * flight.law.standoff
+    assert metrics["altitude_deviation_peak_m"] < 15.0
+    assert metrics["sideslip_peak_deg"] < 6.0
+    assert metrics["bank_peak_deg"] < math.degrees(aircraft.limits(folder).bank)
+
+
+def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tuple[str, Path]) -> None:
+    _, folder = adopted
+    assert {file.name for file in folder.iterdir()} == {
+        "airframe.toml", "circle.toml", "c172p.xml", "inner_loop.toml",
+    }  # fmt: skip
+    assert list(aircraft.data(folder)["adopted"]["sources"]) == ["c172p.xml", "eng_io320.xml", "prop_75in2f.xml"]
+
+
+@pytest.mark.parametrize(
+    ("model", "stage", "cause"),
+    [
+        ("minisgs", "engine", "no engine"),
+        ("F450", "engine", "throttle has no effect: thrust"),
+    ],
+)
+def test_a_model_that_cannot_fly_is_refused_with_its_cause_and_leaves_no_folder(
+    model: str, stage: str, cause: str, tmp_path: Path
+) -> None:
+    said = invoke("adopt", model, "--out", tmp_path / "out")
+    assert said.exit_code == 1
+    assert f"not adopted: {stage}: {cause}" in said.output
+    assert not (tmp_path / "out" / model).exists()
+
+
+def test_a_command_without_a_standard_name_is_found_by_what_it_moves(tmp_path: Path) -> None:
+    model = (data_root() / "aircraft" / "c172p" / "c172p.xml").read_text(encoding="utf-8")
+    folder = tmp_path / "renamed"
+    folder.mkdir()
+    write(folder / "renamed.xml", model.replace("fcs/aileron-cmd-norm", "fcs/my-roll-cmd"))
+    for engine in ("eng_io320", "prop_75in2f"):
+        shutil.copy(data_root() / "engine" / f"{engine}.xml", folder)
+    said = invoke("adopt", folder / "renamed.xml", "--out", tmp_path / "out")
+    assert said.exit_code == 0, said.output
+    assert aircraft.data(tmp_path / "out" / "renamed")["adopted"]["controls"]["aileron"] == "fcs/my-roll-cmd"
+
+
+def test_a_mistake_in_a_map_of_controls_is_one_line(tmp_path: Path) -> None:
+    controls = write(tmp_path / "controls.toml", "flaps = 1")
+    said = invoke("adopt", "c172p", "--controls", controls)
+    assert said.exit_code == 2
+    assert "flaps is not one of elevator, aileron, rudder, throttle" in said.output
