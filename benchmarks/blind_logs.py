@@ -28,7 +28,7 @@ from harness.loop import simulate
 from harness.plants.plant import Start
 from harness.pool import computed
 from harness.recorded import fitted_plant, response_fit, turn
-from harness.recorded.assessment import CANNOT, LAG, Assessment, assess
+from harness.recorded.assessment import CANNOT, GAIN, LAG, LATERAL, Assessment, assess
 from harness.recorded.recorded_flight import Basis, Channel, LogError, RecordedFlight
 from harness.recorded.wind import Fit, track_of
 from harness.tables import markdown
@@ -41,7 +41,14 @@ Array = NDArray[np.float64]
 
 PAGE = Path("docs/answers/blind_logs.md")
 LOGS = 200
+DECIDED = {Verdict.HOLDS, Verdict.FAILS}
 COVERED, WRONG = 0.90, 0.05  # what is asked: of the intervals, at least; of the claims, at most
+OTHERS = (
+    PARTS["altitude_deviation_peak_m"],
+    PARTS["airspeed_deviation"],
+    LATERAL,
+    GAIN,
+)  # parts without a hidden number
 CIRCLE = 15.4  # s: the standoff distance of the paper's case over its airspeed
 KINDS = ("circles", "manoeuvres", "straight")
 SHARES = (0.4, 0.4, 0.2)
@@ -62,6 +69,7 @@ class Hidden:
     turn_ratio: float  # of the same windows of the true flight; NaN without turns
     wind: tuple[float, float]  # mean over the flight, m/s north, east
     lag: float  # of the bank behind its command, s; NaN where the command does not move
+    words: Mapping[str, str]  # of the other parts, by title, as the true flight has them
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +181,7 @@ def logged(log: FlightLog, kind: str, of: np.random.Generator) -> BlindLog:
         of_receipt=of_receipt,
         turbulent=log.flight.wind.turbulence != "none", turn_ratio=_true_turn_ratio(log),
         wind=(float(log["wind_north"].mean()), float(log["wind_east"].mean())), lag=_true_lag(log, held),
+        words=_true_words(log, held),
     )  # fmt: skip
     return BlindLog(log.flight, streams, hidden)
 
@@ -217,6 +226,12 @@ def _true_lag(log: FlightLog, held: Array) -> float:
     return fit.lag if fit else math.nan
 
 
+def _true_words(log: FlightLog, held: Array) -> dict[str, str]:
+    command = Channel(log["time"] + 0.5 * log.flight.guidance_period, held, Basis.COMMANDED, "", len(log))
+    found = assess(true_flight(log).with_channel("bank_command", command))
+    return {part.title: found[part.title].word for part in OTHERS}
+
+
 class Told(NamedTuple):
     """What was said of one hidden number; None where nothing was."""
 
@@ -243,6 +258,8 @@ class Answer(NamedTuple):
     signs_right: bool
     reason: str  # why there is no turn relation; empty where there is one
     gains: Gains
+    decided: int  # words, holds or fails, of the other parts
+    contradicted: Sequence[str]  # those of them that the true flight has the other way
 
 
 def answered(seed: int) -> Answer:
@@ -303,7 +320,9 @@ def compared(seed: int, hidden: Hidden, found: Assessment) -> Answer:
         or (found.estimated.is_reversed is hidden.wind_reversed or math.hypot(*hidden.wind) < 1.0)
     ) and (relation.word == CANNOT or any("bank: the sign" in note for note in found.notes) is hidden.bank_reversed)
     reason = relation.reason if relation.word == CANNOT else ""
-    return Answer(seed, hidden.kind, hidden.format, told, signs, reason, Gains())
+    decided = {part.title: found[part.title].word for part in OTHERS if found[part.title].word in DECIDED}
+    contradicted = [title for title, word in decided.items() if {word, hidden.words[title]} == DECIDED]
+    return Answer(seed, hidden.kind, hidden.format, told, signs, reason, Gains(), len(decided), contradicted)
 
 
 def _told(true: float, low: float, high: float) -> Told:
@@ -340,6 +359,9 @@ def page(answers: Sequence[Answer]) -> Iterator[str]:
     yield "The turn relation is that of the same windows of the true flight; wind in m/s, both components within; the"
     yield "lag in s, of a fit to the true bank and command: where the age of the telemetry is in the times, the"
     yield "interval is an upper bound."
+    decided, contradicted = (sum(answer.decided for answer in answers), [t for a in answers for t in a.contradicted])
+    yield f"Level flight, constant airspeed, lateral force and bank as commanded hold or fail {decided} times;"
+    yield f"{len(contradicted)} of these words contradict the true flight's."
     signs = sum(answer.signs_right for answer in answers)
     yield f"The signs of wind and bank were told right in {signs} of {len(answers)} logs."
     yield ""

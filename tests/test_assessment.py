@@ -5,7 +5,7 @@ import math
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ LEVEL, AIRSPEED, SIDESLIP = (
     PARTS[column].title for column in ("altitude_deviation_peak_m", "airspeed_deviation", "sideslip_rms_deg")
 )
 RELATION = PARTS["turn_ratio"].title
+STILL = 3  # circles without turbulence: the turn relation holds
 ON_BOARD = 5  # a log of circles, on board: a limit cycle that tells the response
 
 
@@ -119,6 +120,19 @@ def test_too_few_turns_are_refused_with_the_number_that_is_needed() -> None:
     finding = assess(flight, flight.begin, flight.begin + 30.0)[RELATION]
     assert finding.word == CANNOT
     assert "5 are needed" in finding.reason
+
+
+def test_nothing_is_decided_in_a_wind_of_the_autopilot_whose_error_is_unknown() -> None:
+    flight = log(STILL).recorded()
+    north, east = log(STILL).hidden.wind
+    known = {"wind_north": north, "wind_east": east}
+    for name, value in known.items():
+        flight = flight.changed(partial(np.full_like, fill_value=value), name)
+    assert assess(flight)[RELATION].word == Verdict.HOLDS
+    found = assess(without(flight, "airspeed"))[RELATION]
+    assert found.word == Verdict.UNDECIDED
+    assert "the wind is the autopilot's" in found.reason
+    assert found.low < found.value < found.high
 
 
 def test_after_a_failure_nothing_is_judged_and_before_it_all_that_is_before() -> None:

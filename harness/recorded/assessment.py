@@ -202,7 +202,7 @@ class _Turning:
     """The turn relation and what it rests on."""
 
     sample: Sample
-    reason: str
+    barred: str  # why nothing may be decided by it
     wind: SteadyWind | None
     estimated: Estimated | None
     points: tuple[TurnPoint, ...]
@@ -291,9 +291,9 @@ def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fi
     with_interval = [(float(v), *(s.interval() or (float(v),) * 2)) for v, s in zip(value, samples, strict=True)]
     _, north, east, scale = with_interval
     wind = SteadyWind(north, east, None if fixed else scale, "autopilot" if fixed else "track")
-    reason = "" if fixed is None else "with the autopilot's wind, whose error the interval does not hold"
+    barred = "" if fixed is None else "the wind is the autopilot's, whose error the interval does not hold"
     points = tuple(_point(track, of, whole, window) for window in windows)
-    return _Turning(samples[0], reason, wind, None, points, age)
+    return _Turning(samples[0], barred, wind, None, points, age)
 
 
 def _point(track: GroundTrack, of: turn.Integrals, wind: Fit, window: TurnWindow) -> TurnPoint:
@@ -346,12 +346,13 @@ class _Made:
 
     sample: Sample
     reason: str = ""
+    barred: str = ""  # why nothing may be decided by it
 
 
 def _turn_relation(turning: "_Turning | Refusal") -> _Made:
     if isinstance(turning, Refusal):
         raise turning
-    return _Made(turning.sample, turning.reason)
+    return _Made(turning.sample, barred=turning.barred)
 
 
 def _level(flight: RecordedFlight) -> _Made:
@@ -483,7 +484,9 @@ def _worded(made: "dict[str, _Made | Refusal]", limits: dict[str, float]) -> Ite
         sample, bounds, word = each.sample, _bounds(part, limits), family[column]
         low, high = sample.interval() or (math.nan, math.nan)
         needed, reason = None, each.reason
-        if word is Verdict.UNDECIDED:
+        if each.barred:
+            word, reason = Verdict.UNDECIDED, each.barred
+        elif word is Verdict.UNDECIDED:
             level = limits["significance"] / max(1, sum(test.can_err for test in tests.values()))
             needed = seeds_to_decide(sample, *bounds, level)
             reason = "; ".join(filter(None, [reason, "the interval crosses the margin"]))
