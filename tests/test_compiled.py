@@ -246,3 +246,33 @@ def test_kernels_go_to_the_temporary_files_where_the_cache_cannot_be_written(
     found = kernel.folder.__wrapped__()
     assert found.parent == tmp_path
     assert found.stat().st_mode & 0o77 == 0
+
+
+def test_a_flight_is_flown_by_python_where_no_kernel_can_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from harness.compiled import kernel
+
+    nowhere = write(tmp_path / "file", "") / "cache"
+    monkeypatch.setenv(kernel.FOLDER, str(nowhere))
+    monkeypatch.setattr("tempfile.tempdir", str(nowhere))
+    monkeypatch.setattr(kernel, "folder", kernel.folder.__wrapped__)
+    monkeypatch.setattr(kernel, "_KERNELS", {})
+    assert engine.why_plain(FLIGHT).startswith("no kernel can be made: NotADirectoryError")
+    assert engine.simulate(FLIGHT).digest == loop.simulate(FLIGHT).digest
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("falsify", "--requirement", "range_error_peak_m<5"), ("tune", "--minimise", "range_error_peak_m")],
+)
+def test_a_search_finds_the_same_with_either_engine(tmp_path: Path, words: tuple[str, ...]) -> None:
+    name, *options = words
+    found = []
+    for kind in ("python", "compiled"):
+        settings = ("--set", "plant=kinematic", "--set", "duration_s=10", "--workers", 0, "--engine", kind)
+        searched = ("--over", "law.k2=1:9", "--flights", 12, *options)
+        ran = invoke(name, EXPERIMENTS / "stationary.toml", "--out", tmp_path / kind, *settings, *searched)
+        assert ", 0 failed" in ran.output
+        found.append((tmp_path / kind / "trials.csv").read_text())
+    assert found[0] == found[1]

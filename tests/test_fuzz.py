@@ -151,7 +151,8 @@ CALLS: Mapping[str, Sequence[str]] = {
         f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 {TRACKED}",
         f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --set aircraft=AIRFRAME",
         "MATRIX --out RUN --limit 8 --workers 0 --log none", "MATRIX --dry-run --limit WORD",
-        "MATRIX --dry-run --shard WORD", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --shard 2/3",
+        "MATRIX --dry-run --shard WORD",
+        "MATRIX --out OUT --engine WORD", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --shard 2/3",
     ],
     "falsify": [
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement WORD",

@@ -59,6 +59,8 @@ def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
             _KERNELS[shape] = _loaded(function)
         except NotLiftedError as error:
             _KERNELS[shape] = str(error)
+        except Exception as error:  # a full disk, a Numba that does not start: Python flies all the same
+            _KERNELS[shape] = f"no kernel can be made: {type(error).__name__}: {error}"
     found = _KERNELS[shape]
     if isinstance(found, str):
         raise NotCompiledError(found)
