@@ -8,10 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from harness.recorded.assessment import assess
 from harness.recorded.column_map import read_map, shipped
 from harness.recorded.contents import contents
 from harness.recorded.read import read_log
 from harness.recorded.recorded_flight import Array, Basis, LogError, RecordedFlight, sampled
+from harness.recorded.said import lines as said
 from tests import mutations
 from tests.builders import invoke, write
 from tests.recorded_logs import (
@@ -159,8 +161,11 @@ def test_what_is_wrong_with_the_rows_of_a_csv_is_said(tmp_path: Path) -> None:
     assert "1 of 80 rows have the time of the row before" in told(tmp_path, changed("t", put(10, COLUMNS["t"][9])))
     assert "1 of 80 rows have no time" in told(tmp_path, changed("t", put(10, np.nan)))
     assert "1 of 80 values of bank are no numbers" in told(tmp_path, changed("roll", put(10, np.nan)))
+    longer = {name: np.append(column, column[:20] + 4000.0 * (name == "t")) for name, column in COLUMNS.items()}
+    longer["t"] = put(10, 9e6)(longer["t"].copy())
     late = told(tmp_path, changed("t", put(10, 310.0)))
     assert "1 of 80 rows come up to 0.14 s too late, and are put in order" in late
+    assert "1 of 100 rows have a time far off" in told(tmp_path, longer)
     back = changed("t", lambda t: np.where(t < 2000.0, t + 5000.0, t))
     assert "the clock goes back at row 41 from 1.95 s to -3.00 s after its first" in told(tmp_path, back)
 
@@ -208,7 +213,7 @@ def test_a_file_that_is_no_log_is_one_line(tmp_path: Path) -> None:
 
 def test_a_mistake_in_a_map_is_named_by_its_key(tmp_path: Path) -> None:
     log = write_csv(tmp_path / "a.csv", COLUMNS)
-    for old, new, said in (
+    for old, new, complaint in (
         (
             'unit = "deg", basis = "commanded"',
             'unit = "rad/s", basis = "commanded"',
@@ -221,7 +226,7 @@ def test_a_mistake_in_a_map_is_named_by_its_key(tmp_path: Path) -> None:
         ("[[file]]", "[file]", "[[file]] is missing"),
         ("clock =", "clock", "map.toml"),
     ):
-        assert said in refused(log, "--map", write(tmp_path / "map.toml", MAP.replace(old, new)))
+        assert complaint in refused(log, "--map", write(tmp_path / "map.toml", MAP.replace(old, new)))
 
 
 def test_a_cut_log_gives_what_it_has(tmp_path: Path) -> None:
@@ -246,6 +251,14 @@ def test_messages_that_nothing_describes_are_skipped_and_counted(tmp_path: Path)
     assert "23 bytes belong to no known message" in flight.problems[0]
 
 
+def test_a_damaged_time_does_not_make_a_log_a_year_long(tmp_path: Path) -> None:
+    letters, _ = MESSAGES["ARSP"]
+    rare = {"TimeUS": np.array([3e7]), "I": np.zeros(1), "Airspeed": np.array([17.0])}
+    flight = read_log([write_dataflash(tmp_path / "a.bin", {**MESSAGES, "ARSP": (letters, rare)})])
+    assert flight.end < 4.0
+    assert "airspeed has times a day away from the others" in flight.problems[-1]
+
+
 def test_a_command_that_repeats_what_is_flown_is_none(tmp_path: Path) -> None:
     letters, table = MESSAGES["ATT"]
     flight = read_log([write_dataflash(tmp_path / "a.bin", {"ATT": (letters, {**table, "DesRoll": table["Roll"]})})])
@@ -262,7 +275,8 @@ def test_a_damaged_log_is_read_or_refused_in_one_line(kind: str, data: st.DataOb
     Path(str(log)).write_bytes(data.draw(mutations.contents(content)))
     lines: list[str] = []
     try:
-        lines += contents(read_log([Path(str(log))], str(map_[1]) if map_ else None))
+        flight = read_log([Path(str(log))], str(map_[1]) if map_ else None)
+        lines += [*contents(flight), *said(assess(flight))]
     except LogError as error:
         lines += str(error).splitlines()
     assert lines

@@ -19,6 +19,8 @@ from harness.recorded.recorded_flight import (
 
 FASTEST = 100.0  # 1/s: rows that come faster are averaged, so that a long log takes no large memory
 LARGEST, LARGEST_TIME = 1e9, 1e11  # SI: a larger number is none
+WILD = 0.01  # of the rows: so few with a time far off are damaged; of more, the clock was set back
+LONGEST = 86_400.0  # s from the middle of a log: what is further away is damaged
 DISORDER = 1.0  # s: rows that come so much too late are put in order; beyond it the clock was set back
 
 
@@ -59,6 +61,11 @@ class Draft:
         if missing := len(time) - len(rows):
             self.problems.append(f"{source}: {missing} of {len(time)} rows have no time, and are left out")
         t = time[rows]
+        far = np.abs(t - np.median(t)) > LONGEST if len(t) else t > 0.0
+        far |= t - np.minimum.accumulate(t[::-1])[::-1] > DISORDER
+        if 0 < (wild := int(np.count_nonzero(far))) <= WILD * len(t):
+            self.problems.append(f"{source}: {wild} of {len(time)} rows have a time far off, and are left out")
+            rows, t = rows[~far], t[~far]
         late = np.maximum.accumulate(t) - t if len(t) else t
         if len(t) and late.max() > DISORDER:
             k = int(np.argmax(late > DISORDER))
@@ -69,7 +76,7 @@ class Draft:
             how = f"come up to {late.max():.3g} s too late, and are put in order"
             self.problems.append(f"{source}: {disordered} of {len(time)} rows {how}")
             rows = rows[np.argsort(t, kind="stable")]
-        repeated = np.append(False, np.diff(time[rows]) == 0.0)
+        repeated = np.diff(time[rows], prepend=-np.inf) == 0.0
         if count := int(np.count_nonzero(repeated)):
             self.problems.append(
                 f"{source}: {count} of {len(time)} rows have the time of the row before, and are left out"
@@ -77,8 +84,19 @@ class Draft:
         kept: NDArray[np.intp] = rows[~repeated]
         return kept
 
+    def _leave_out_what_is_far_off(self) -> None:
+        """Channels with a time more than `LONGEST` from the middle of the one with most samples."""
+        if not self.channels:
+            return
+        middle = float(np.median(max(self.channels.values(), key=len).time))
+        for name, channel in list(self.channels.items()):
+            if np.abs(channel.time - middle).max() > LONGEST:
+                del self.channels[name]
+                self.problems.append(f"{channel.source}: {name} has times a day away from the others, and is left out")
+
     def finished(self) -> RecordedFlight:
         """The flight, its times in seconds since the log's first row. Raises `LogError` for one without any channel."""
+        self._leave_out_what_is_far_off()
         if not self.channels:
             why = "; ".join([*self.refusals, *self.problems])
             raise LogError(f"{self.name}: has nothing that a flight is judged by{f' ({why})' if why else ''}")

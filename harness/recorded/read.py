@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from harness.recorded import dataflash, ulog
 from harness.recorded.csv_log import read_csv
 from harness.recorded.frames import with_derived
@@ -25,14 +27,17 @@ def read_log(paths: Sequence[Path], map_name: str | None = None) -> RecordedFlig
     if binary and map_name:
         raise LogError(f"{binary[0]}: describes itself; --map is for CSV files")
     try:
-        if binary:
-            read = ulog.read_ulog if kinds[0] == ulog.MAGIC else dataflash.read_dataflash
-            flight = read(files[0])
-        else:
-            flight = read_csv(files, map_name)
+        with np.errstate(all="ignore"):  # of damaged numbers, which are then left out
+            flight = _read(files, kinds, map_name)
     except MemoryError:
         raise LogError(f"{files[0]}: takes more memory than there is") from None
     return plausible(with_derived(flight))
+
+
+def _read(files: Sequence[Path], kinds: Sequence[bytes], map_name: str | None) -> RecordedFlight:
+    if kinds[0] == ulog.MAGIC:
+        return ulog.read_ulog(files[0])
+    return dataflash.read_dataflash(files[0]) if kinds[0] else read_csv(files, map_name)
 
 
 def _files(path: Path) -> Iterator[Path]:
