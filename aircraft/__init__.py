@@ -104,7 +104,7 @@ def is_stale(airframe: Path) -> bool:
     data(airframe), inner_loop(airframe)  # raises for what is no data
     if written(airframe).is_file():
         return bool(_read(written(airframe)).get("data") != _data_hash(airframe))
-    if "adopted" in data(airframe):
+    if adopted(airframe):
         return False
     from aircraft.write_models import jsbsim_model  # late: no other airframe needs the template
 

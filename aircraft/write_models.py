@@ -14,6 +14,8 @@ import aircraft
 def jsbsim_model(airframe: Path) -> str:
     """The text of the JSBSim model made from the data in the folder `airframe`. Raises `AirframeError`."""
     data, inner_loop = aircraft.data(airframe), aircraft.inner_loop(airframe)
+    if aircraft.adopted(airframe):
+        raise aircraft.AirframeError(f"{airframe}: is an adopted model, which `harness adopt` writes; --keep keeps it")
     try:
         return _rendered(airframe.name, data, inner_loop)
     except (TemplateError, LookupError, TypeError, ArithmeticError, AttributeError) as error:

@@ -151,9 +151,10 @@ def airframe_of(name: str) -> Path:
     aircraft.limits(airframe)
     if aircraft.is_stale(airframe):
         model, again = aircraft.model(airframe).name, f"python -m aircraft.write_models {aircraft.argument(airframe)}"
+        anew = "run `harness adopt` again, or" if aircraft.adopted(airframe) else f"run `{again}`, or"
         raise ValueError(
-            f"{airframe}: {model} was not written from airframe.toml and inner_loop.toml as they are: run `{again}`, "
-            f"with --keep to fly {model} as it is"
+            f"{airframe}: {model} was not written from airframe.toml and inner_loop.toml as they are: {anew} "
+            f"`{again} --keep` to fly {model} as it is"
         )
     return airframe
 

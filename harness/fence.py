@@ -27,6 +27,7 @@ DEEPEST = 60  # elements in each other; there 13. JSBSim itself ends the process
 LONGEST_DELAY = 60.0  # s, or thousands of frames, of a component: JSBSim keeps a number for each step
 _ENGINES = ("Engines", "engines", "Engine", "engine")  # folders, in the order in which JSBSim looks
 _SYSTEMS = (".", "Systems", "systems")
+_PROPERTY = re.compile(r"/?[A-Za-z_][\w.-]*(\[\d+\])?(/[A-Za-z_][\w.-]*(\[\d+\])?)+", re.ASCII)
 _MASSES = ("emptywt", "ixx", "iyy", "izz")
 
 
@@ -285,6 +286,13 @@ def fault_of(name: str) -> str:
     if ".." in path or "." in path:
         return f"{name.strip()}: the name of a property may not have . or .. in it"
     return ""
+
+
+def fault_of_command(name: str) -> str:
+    """Why no property that is written can have this name; empty if one can."""
+    if not _PROPERTY.fullmatch(name):
+        return f"{name!r} is no name of a property, which is like fcs/elevator-cmd-norm or fcs/throttle-cmd-norm[1]"
+    return fault_of(name)
 
 
 def _written(element: ElementTree.Element, is_declaration: bool) -> Iterator[str]:

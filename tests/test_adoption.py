@@ -50,7 +50,7 @@ def test_an_adopted_aircraft_flies_the_experiment_that_was_written_for_it(adopte
 def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tuple[str, Path]) -> None:
     _, folder = adopted
     assert {file.name for file in folder.iterdir()} == {
-        "airframe.toml", "circle.toml", "c172p.xml", "inner_loop.toml",
+        "airframe.toml", "circle.toml", "c172p.xml", "inner_loop.toml", "written.toml",
     }  # fmt: skip
     assert list(aircraft.data(folder)["adopted"]["sources"]) == ["c172p.xml", "eng_io320.xml", "prop_75in2f.xml"]
 

@@ -244,7 +244,8 @@ def test_edited_data_are_refused_until_the_model_is_written_from_them_or_kept(
     if name == "inner_loop.toml":
         assert not aircraft.is_stale(mine)  # the same numbers, otherwise written
         edited(mine, name, f"{gain} ={{ v = {data[gain]['v']}", f"{gain} = {{ v = {2.0 * data[gain]['v']}")
-    told = f"mine.xml was not written from airframe.toml .* run `python -m aircraft.write_models {mine}`, with --keep"
+    again = f"python -m aircraft.write_models {mine}"
+    told = f"mine.xml was not written from airframe.toml .* run `{again}`, or `{again} --keep` to fly"
     with pytest.raises(ValueError, match=told):
         airframe_of(str(mine))
     before = load(mine, STEP)
@@ -288,3 +289,18 @@ def test_write_models_writes_what_it_is_told_and_says_what_it_cannot(
             write_models(words)
         (line,) = capsys.readouterr().err.splitlines()
         assert told in line
+
+
+def test_an_edit_of_an_adopted_airframe_is_refused_and_its_model_is_not_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = copied_airframe("aerosonde", tmp_path / "mine")
+    edited(mine, "airframe.toml", "[mass]", "[adopted]\nstep = 0.005\n[mass]")
+    write_models(["--keep", str(mine)])
+    assert airframe_of(str(mine)) == mine
+    edited(mine, "inner_loop.toml", "bank-rad = { v = 0.", "bank-rad = { v = 0.1")
+    with pytest.raises(ValueError, match="as they are: run `harness adopt` again, or"):
+        airframe_of(str(mine))
+    with pytest.raises(SystemExit, match="2"):
+        write_models([str(mine)])
+    assert "is an adopted model, which `harness adopt` writes" in capsys.readouterr().err

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import jsbsim
 import pytest
 
 import harness
@@ -314,3 +315,51 @@ def test_a_model_that_is_no_body_is_refused_once_it_is_loaded(tmp_path: Path) ->
     assert "the mass of the model is -" in ended.stderr
     assert "kg, must be above 0" in ended.stderr
     assert ended.returncode == 2
+
+
+MODELS = Path(jsbsim.get_default_root_dir()) / "aircraft"
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("there/c172p/c172p.xml --out there", "there/c172p holds the model itself, which would be overwritten"),
+        ("c172p --out there", "there/c172p is there, and is no adopted model"),
+        ("c172p --airspeed nan", "--airspeed: nan, must be a finite number"),
+        ("c172p --bandwidth nan", "--bandwidth: nan, must be a finite number"),
+        ("c172p --controls pipe", "--controls: pipe: is a pipe or a device"),
+        ("c172p --controls reset.toml", "elevator: writes simulation/reset: a model may read"),
+        ("c172p --controls output.toml", "is no name of a property, which is like fcs/elevator-cmd-norm"),
+        ("c172p --controls null.toml", "is no name of a property"),
+        ("pipe --out out", "guard: pipe: must be a file"),
+        ("/dev/zero --out out", "guard: /dev/zero: must be a file"),
+        ('there/c172p/a"b.xml --out out', "is to be a folder's name: letters, digits"),
+        ("there/c172p/...xml --out out", "is to be a folder's name: letters, digits"),
+    ],
+)
+def test_an_adoption_that_would_overwrite_hang_or_write_elsewhere_is_one_line(
+    words: str, why: str, tmp_path: Path, confined: Confined
+) -> None:
+    (tmp_path / "there").mkdir()
+    theirs = Path(shutil.copytree(MODELS / "c172p", tmp_path / "there" / "c172p"))
+    for name in ('a"b.xml', "...xml"):
+        shutil.copy(theirs / "c172p.xml", theirs / name)
+    os.mkfifo(tmp_path / "pipe")
+    write(tmp_path / "reset.toml", 'elevator = "simulation/reset"')
+    more = "</output></fcs_function></channel></system><output name='out.csv'/>"
+    write(tmp_path / "output.toml", f'elevator = "a/b{more}"')
+    write(tmp_path / "null.toml", 'throttle = ["fcs/throttle-cmd-norm\\u0000"]')
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+    assert why in told(confined.run(["adopt", *words.split()], tmp_path))
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("text", [ENDLESS, BY_ZERO], ids=["at its load", "in flight"])
+def test_a_model_that_ends_the_process_is_not_adopted_and_leaves_nothing(text: str, tmp_path: Path) -> None:
+    theirs = Path(shutil.copytree(MODELS / "c172p", tmp_path / "c172p"))
+    model = (theirs / "c172p.xml").read_text(encoding="utf-8")
+    write(theirs / "c172p.xml", model.replace("</fdm_config>", f"{text}</fdm_config>"))
+    ended = builders.command("adopt", theirs / "c172p.xml", "--out", tmp_path / "out")
+    assert ended.returncode == 1
+    assert "the process was ended by SIG" in ended.stderr
+    assert list((tmp_path / "out").iterdir()) == []

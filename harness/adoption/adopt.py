@@ -1,18 +1,21 @@
 """Adopts a JSBSim model, stage by stage: each says what it found, or why the model cannot be flown."""
 
 import math
+import re
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+import aircraft
 from harness.adoption.adoption import STANDARD, STEP, Adoption, Wish, motion, write
 from harness.adoption.design import designed
 from harness.adoption.linear import linearised
 from harness.adoption.manoeuvres import circled, law_of, turned
-from harness.adoption.model import named, source, writers
+from harness.adoption.model import Original, named, source, writers
 from harness.adoption.refusal import RefusalError
 from harness.child import MEMORY, ChildError, limited
 from harness.files import make_folder, write_text
@@ -23,7 +26,7 @@ from harness.plants.wind_tunnel import STEADY, Controls, NotFiniteError, TrimPoi
 
 SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0)  # times that of the lift coefficient below
 LIFT_COEFFICIENT = 0.5
-SECONDS = 60.0  # that a stage may take
+SECONDS = 60.0  # that all stages together may take
 _THROTTLES = (0.15, 0.4, 0.65, 0.9)
 _MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # of a command in trim
 
@@ -36,7 +39,10 @@ def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
 
     Each stage runs in a process of its own. The folder is written when all stages are through.
     """
+    end = time.monotonic() + SECONDS
     model = source(name)
+    kept = out / model.name
+    _check_place(kept, model)
     left_out = f", {len(model.fenced.left_out)} left out" if model.fenced.left_out else ""
     yield "guard", f"{len(model.fenced.sources)} files, {sum(1 for _ in model.root.iter())} elements{left_out}"
     with tempfile.TemporaryDirectory(prefix="harness-") as temporary:
@@ -52,18 +58,33 @@ def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
         for stage, work in STAGES.items():
             write(adoption, model)
             try:
-                adoption, line = limited(stage, SECONDS, MEMORY, work, adoption)
+                adoption, line = limited(stage, max(1.0, end - time.monotonic()), MEMORY, work, adoption)
             except ChildError as error:
-                raise RefusalError(stage, error.cause) from None
+                late = f"not done after {SECONDS:g} s, which a model has for all stages"
+                raise RefusalError(stage, late if error.is_late else error.cause) from None
             except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
-                raise RefusalError(stage, " ".join(str(error).split())) from None
+                raise RefusalError(stage, " ".join(str(error).replace(f"{temporary}/", "").split())) from None
             yield stage, line
         write(adoption, model)
-        kept = out / model.name
         make_folder(kept)
         for pattern in _FILES:
             if (file := folder / pattern.format(name=model.name)).exists():
                 write_text(kept / file.name, file.read_text(encoding="utf-8"))
+        aircraft.keep_written(kept)
+
+
+def _check_place(kept: Path, model: Original) -> None:
+    """Raises `RefusalError` for a folder that holds the model itself, or something else than an adoption."""
+    if not re.fullmatch(r"\w[\w .+-]*", model.name):
+        raise RefusalError("guard", f"{model.name!r} is to be a folder's name: letters, digits, spaces and .+-_ only")
+    if any(kept.resolve() in Path(file).resolve().parents for file in model.fenced.sources):
+        raise RefusalError("guard", f"{kept} holds the model itself, which would be overwritten: give another --out")
+    if kept.exists() and not (kept.is_dir() and (_is_adopted(kept) or not any(kept.iterdir()))):
+        raise RefusalError("guard", f"{kept} is there, and is no adopted model: give another --out, or move it away")
+
+
+def _is_adopted(folder: Path) -> bool:
+    return (folder / "airframe.toml").is_file() and aircraft.adopted(folder) is not None
 
 
 def _load(a: Adoption) -> Found:

@@ -50,6 +50,11 @@ def adopt(
     from harness.cli._input import BadInput
     from harness.cli._paths import writable_folder
 
+    for option, value in (
+        ("--airspeed", airspeed), ("--altitude", altitude), ("--max-bank", max_bank), ("--bandwidth", bandwidth)
+    ):  # fmt: skip
+        if value is not None and not math.isfinite(value):
+            raise BadInput(f"{option}: {value}, must be a finite number")
     names = _controls(controls) if controls else None
     writable_folder(out)
     wish = Wish(
@@ -76,10 +81,12 @@ def _controls(file: Path) -> dict[str, object]:
     import tomllib
 
     from harness.cli._input import BadInput
+    from harness.fence import fault_of_command
+    from harness.files import read
 
     allowed = ("elevator", "aileron", "rudder", "throttle")
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
+        table = tomllib.loads(read(file).decode())
     except OSError as error:
         raise BadInput(f"--controls: {file}: {error.strerror}") from None
     except ValueError as error:
@@ -90,4 +97,7 @@ def _controls(file: Path) -> dict[str, object]:
         texts = value if isinstance(value, list) and name == "throttle" else [value]
         if not texts or not all(isinstance(text, str) and text.strip() for text in texts):
             raise BadInput(f"--controls: {file}: {name} must be the name of a property")
+        for text in texts:
+            if fault := fault_of_command(text):
+                raise BadInput(f"--controls: {file}: {name}: {fault}")
     return table
