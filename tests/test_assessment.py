@@ -190,7 +190,10 @@ def test_a_command_at_rest_does_not_tell_the_lag() -> None:
 
 def test_a_log_too_short_to_judge_is_one_sentence_and_a_longer_one_a_table() -> None:
     said = invoke("assess", "experiments/flights/lateral_doublet_4.csv").output
-    assert "The assumption cannot be judged from this log: airborne for 6.5 s at most" in said
+    assert "- airborne for 6.5 s at most; 10 s are needed: level flight" in said
+    assert "circular" in said
+    ground = log(2).recorded().changed(lambda v: 0.01 * v, "velocity_north", "velocity_east", "airspeed")
+    assert next(lines(assess(ground))).startswith("The assumption cannot be judged from this log: never airborne")
     found = assess(log(2).recorded())
     table = "\n".join(lines(found))
     assert all(name in table for name in ("turn relation", "no vane", "wind, by the track"))

@@ -39,6 +39,8 @@ LEAST_EXPLAINED = 0.8  # of the bank, by its command
 SAMPLES_IN_LAG = 3.0  # values of the bank within the lag, or it cannot be told
 WIND_MOVED = 2.0  # m/s, from the beginning to the end of a flight
 
+_CIRCULAR = "no vane: an angle made of an estimated wind is circular, since that takes sideslip for zero"
+
 LATERAL = Part(
     "lateral force", "lateral_force", "of g sin(bank)", "turn_ratio", "within", Group.COORDINATED, assumed=0.0
 )
@@ -113,7 +115,9 @@ def assess(
     try:
         begin, end = _flown(flight, begin, end)
     except Refusal as refusal:
-        refused = tuple(PartFinding(part, CANNOT, str(refusal)) for part in _PARTS)
+        circular = "sideslip" in flight and flight["sideslip"].basis is not Basis.MEASURED
+        reasons = [_CIRCULAR if part is _SIDESLIP and circular else str(refusal) for part in _PARTS]
+        refused = tuple(PartFinding(part, CANNOT, reason) for part, reason in zip(_PARTS, reasons, strict=True))
         return Assessment(flight, begin, end, refused, None, None, (), math.nan, None, ())
     cut = flight.between(begin, end)
     notes: list[str] = []
@@ -384,7 +388,7 @@ def _sideslip(flight: RecordedFlight) -> _Made:
         raise Refusal("no vane: the log has no sideslip")
     channel = flight["sideslip"]
     if channel.basis is not Basis.MEASURED:
-        raise Refusal("no vane: an angle made of an estimated wind is circular, since that takes sideslip for zero")
+        raise Refusal(_CIRCULAR)
     return _Made(_windowed(channel.time, np.degrees(np.abs(channel.values)), _rms))
 
 

@@ -17,9 +17,11 @@ def lines(found: Assessment) -> Iterator[str]:
     """What the flight says of the assumption, and what it does not say."""
     judged = [finding for finding in found.findings if finding.word != CANNOT]
     refused = [finding for finding in found.findings if finding.word == CANNOT]
-    reasons = {finding.reason for finding in refused}
-    if not judged and len(reasons) == 1:
-        yield f"The assumption {CANNOT}: {reasons.pop()}."
+    parts: dict[str, list[str]] = {}  # by the reason why they cannot be judged
+    for finding in refused:
+        parts.setdefault(finding.reason, []).append(finding.part.title)
+    if not judged and len(parts) == 1:
+        yield f"The assumption {CANNOT}: {next(iter(parts))}."
         return
     if judged:
         yield f"What the flight from {found.begin:.1f} to {found.end:.1f} s says of the assumption:"
@@ -29,9 +31,11 @@ def lines(found: Assessment) -> Iterator[str]:
         yield from wind_line(found)
         yield from found.notes
     if refused:
-        yield ""
+        if judged:
+            yield ""
         yield f"What {CANNOT}:"
-        yield from table([], ([f"  {finding.part.title}", finding.reason] for finding in refused), "ll")
+        for reason, titles in parts.items():
+            yield f"- {reason}: {', '.join(titles)}"
 
 
 def row(finding: PartFinding) -> list[str]:
