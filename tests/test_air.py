@@ -124,3 +124,8 @@ def test_a_gust_that_ends_before_it_begins_is_refused() -> None:
     (problem,) = problems(replace(FLIGHT, wind=Wind(gusts=(replace(GUST, to=1.0),))))
     assert problem.name == "wind.gusts.0.to"
     assert "must be after from_s, 1 s" in problem.message
+
+
+def test_a_wind_made_with_a_list_is_the_same_air() -> None:
+    as_list = Wind(steady=[1.0, 2.0], turbulence="light")  # type: ignore[arg-type]
+    assert np.array_equal(air(as_list).gusts, air(Wind(steady=(1.0, 2.0), turbulence="light")).gusts)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from autopilot.response import Delay, Piece
 from harness import loop
 from harness.compiled.kernel import Kernel, NotCompiledError, is_installed, kernel, refuse
-from harness.compiled.loop import COMPLETED, TARGET_LOST, UNUSUAL, at_once, flown, in_pieces
+from harness.compiled.loop import COMPLETED, TARGET_LOST, UNUSUAL, at_once, flown, in_pieces, moving
 from harness.flight import Flight, air_of, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, perfect_estimator
 from harness.log import COLUMNS, FlightLog
@@ -19,7 +19,7 @@ from harness.plants.level import InPieces, Level, MovingInPieces
 from harness.plants.plant import End, Outcome
 from harness.toml_text import shortened
 from harness.world.air import Air
-from harness.world.target import Target, TargetState
+from harness.world.target import Leg, Target, TargetState
 
 Array = NDArray[np.float64]
 _AT_ONCE = 20_000  # rows between two calls of `watch`
@@ -147,8 +147,28 @@ def _judge(function: Any, error: BaseException) -> None:
 @lru_cache(maxsize=8)
 def _target(target: Target, period: float, last: int) -> Array:
     """The target at each row, as `TargetState`: (last + 1, 6)."""
+    if target.track is None and (target.speed or target.segments):
+        return _moving(target, period, last)
     at = target.start()
     return np.array([at(k * period) for k in range(last + 1)], dtype=np.float64)
+
+
+def _moving(target: Target, period: float, last: int) -> Array:
+    """The rows of a target that moves in legs. Raises `NotCompiledError`."""
+    compiled, held = kernel(moving(Leg.at))
+    rows = np.empty((last + 1, len(TargetState._fields)))
+    try:
+        compiled.fly(rows, np.array(target.legs(), dtype=np.float64), period, *held)
+    except Exception as error:
+        _judge(moving(Leg.at), error)
+        raise NotCompiledError(f"an error in the target's motion: {error}") from None
+    if compiled not in _TRUSTED:
+        at = target.start()
+        if not np.array_equal(rows, np.array([at(k * period) for k in range(last + 1)])):
+            refuse(moving(Leg.at), "compiled, a target does not move to the last bit as in Python")
+            raise NotCompiledError("compiled, a target does not move to the last bit as in Python")
+        _TRUSTED.add(compiled)
+    return rows
 
 
 def _known(flight: Flight, target: Array) -> tuple[Array, list[tuple[float, ...]] | None]:

@@ -13,7 +13,7 @@ from harness.knowledge import heading_in, turned
 from harness.log import LOOP_COLUMNS
 from harness.plants.level import Motion, Move, States, carried, level_state
 from harness.plants.state import State
-from harness.world.target import TargetState
+from harness.world.target import Leg, TargetState
 
 COMPLETED, TARGET_LOST, UNUSUAL = 0, 1, 2  # how the loop ended; unusual: the flight is left to Python
 _TARGET = 1 + len(State._fields)  # the first column of the target
@@ -52,6 +52,24 @@ def in_pieces(
         return ended(now, states, acts, given), states
 
     return step
+
+
+def moving(at: Callable[[Leg, float], TargetState]) -> Callable[..., Any]:
+    """A target that moves in legs, at each row."""
+
+    def fill(rows: Any, legs: Any, period: float) -> Any:
+        """Fills the rows with the fields of `TargetState`; `legs` has the fields of a `Leg` in each row."""
+        i = 0
+        for k in range(len(rows)):
+            time = k * period
+            while i + 1 < len(legs) and legs[i + 1, 0] <= time:
+                i += 1
+            leg = Leg(legs[i, 0], legs[i, 1], legs[i, 2], legs[i, 3], legs[i, 4], legs[i, 5], legs[i, 6])
+            state = at(leg, time)
+            for j in range(6):
+                rows[k, j] = state[j]
+
+    return fill
 
 
 def flown(law: LawStep, step: Step) -> Callable[..., Any]:

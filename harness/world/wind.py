@@ -60,6 +60,10 @@ class Wind:
         if self == Wind(steady=self.steady, rotation=self.rotation):
             return Air(steady=self.steady)
         steps = round(duration / step)
+        try:
+            hash(self)
+        except TypeError:  # a list stands in place of a tuple
+            return _made.__wrapped__(self, airspeed, altitude, step, steps, seed)
         made = _made if steps <= _SHARED else _made.__wrapped__
         return made(self, airspeed, altitude, step, steps, seed)
 
