@@ -115,6 +115,11 @@ def test_a_sideslip_of_an_estimated_wind_is_circular_and_one_of_a_vane_is_judged
         assert judged or "circular" in finding.reason
 
 
+def test_numbers_that_no_aircraft_has_are_no_samples() -> None:
+    time, values = np.arange(4.0), np.array([1.0, 1e300, -np.inf, 2.0])
+    assert sampled(time, values, Basis.MEASURED, "").values.tolist() == [1.0, 2.0]
+
+
 def test_too_few_turns_are_refused_with_the_number_that_is_needed() -> None:
     flight = log(1).recorded()
     finding = assess(flight, flight.begin, flight.begin + 30.0)[RELATION]

@@ -23,6 +23,7 @@ _DEGREES = 180.0 / np.pi
 _BETWEEN = (0.3 * _DEGREES, 3.0 * _DEGREES)  # how much larger degrees are, with all that is not exact
 _SPAN = 0.4  # s
 _FEWEST = 8  # spans
+_SHORTEST = 1e-6  # s, between two values: less is a damaged time
 _ALIKE = 0.7  # correlation: an angle is compared with the rate that turns it
 _PAIRS = (("bank", "roll_rate"), ("pitch", "pitch_rate"))
 
@@ -42,7 +43,8 @@ def _too_large(flight: RecordedFlight) -> Iterator[str]:
             if size > 1.1 * MOST[name]:
                 yield f"{channel.source}: {name} reaches {size:.3g} rad: {_SAID}"
         if name in ("yaw", "course") and len(channel) > 3:
-            pace = float(np.percentile(np.abs(np.diff(channel.values) / np.diff(channel.time)), _SHARE))
+            apart = np.maximum(np.diff(channel.time), _SHORTEST)
+            pace = float(np.percentile(np.abs(np.diff(channel.values) / apart), _SHARE))
             if pace > _FASTEST_TURN and np.ptp(channel.values) > 2.0 * np.pi:
                 yield f"{channel.source}: {name} turns at {pace:.3g} rad/s: {_SAID}"
 

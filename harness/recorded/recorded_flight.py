@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 # sample once in HELD usual intervals, so that what does not change is no gap.
 GAP = 8.0
 HELD = 3.0
+LARGEST = 1e9  # as of any setting: a larger number is a damaged one
 
 
 class LogError(HarnessError, OSError, ValueError):
@@ -153,9 +154,9 @@ def sampled(time: Array, values: Array, basis: Basis, source: str, note: str = "
     """The channel of a log's rows, of which those that repeat the value before are no samples.
 
     A row counts when its value is new, or when `HELD` usual intervals between new values have passed without one: then
-    the quantity itself has not changed. `time` increases; rows without a finite number are left out.
+    the quantity itself has not changed. `time` increases; rows without a number below `LARGEST` are left out.
     """
-    finite = np.isfinite(values) & np.isfinite(time)
+    finite = (np.abs(values) < LARGEST) & np.isfinite(time)
     time, values = time[finite], values[finite]
     kept = _new(time, values)
     return Channel(time[kept], values[kept], basis, source, len(time), note)
