@@ -15,7 +15,7 @@ from autopilot.guidance import UNKNOWN, started
 from autopilot.laws import law
 from harness import loop
 from harness.compiled import arithmetic, engine
-from harness.compiled.lifted import NotLiftedError, module_of
+from harness.compiled.lifted import NotLiftedError, held, module_of
 from harness.flight import Flight, MetricSettings
 from harness.flight_errors import Errors
 from harness.log import FlightLog
@@ -219,6 +219,18 @@ def test_a_law_whose_file_has_changed_since_it_was_loaded_is_not_lifted(tmp_path
     write(tmp_path / "own.py", OWN.replace("{memory}", "").replace("max(-self", "max(-2 * self"))
     with pytest.raises(NotLiftedError, match=r"own\.py has changed since it was loaded"):
         module_of(step)
+
+
+def test_laws_with_the_same_step_and_other_constants_share_no_kernel(tmp_path: Path) -> None:
+    shapes = []
+    for constant in (1.0, 2.0):
+        own(tmp_path, "pass")
+        text = (tmp_path / "own.py").read_text().replace("@dataclass", f"FACTOR = {constant}\n\n\n@dataclass")
+        write(tmp_path / "own.py", text.replace("-self.gain * r", "-FACTOR * self.gain * r"))
+        step = started(harness.law(f"{tmp_path / 'own.py'}:Own"), UNKNOWN)
+        shapes.append(held(step)[0])
+        assert f"-{constant}" in module_of(step).text
+    assert shapes[0] != shapes[1]
 
 
 def test_a_watched_flight_tells_its_time_before_and_after_its_blocks_of_rows() -> None:

@@ -10,7 +10,7 @@ import ast
 import builtins
 import copy
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, cast
 from autopilot.guidance import Guidance, Telling, telling
 from autopilot.response import dot
 
-Shape = tuple[Any, ...]  # of what a function holds: its code, then for each name what kind of thing it is
+Shape = tuple[Any, ...]  # of what a function holds: its code and module, then for each name what kind of thing it is
 _NUMBERS = (float, int, bool)
 _BUILTINS = {"abs", "len", "range", "float", "int", "bool", "enumerate", "zip"}
 _ARITHMETIC = {
@@ -72,7 +72,8 @@ def held(function: Any) -> tuple[Shape, tuple[Any, ...]]:
         shape.append((name, *kind))
         if numbers is not None:
             values.append(numbers)
-    return (of.__code__, *shape), tuple(values)
+    module = of.__globals__.get("__name__")  # of a law of one's own by its content: equal code may mean other constants
+    return ((of.__code__, module), *shape), tuple(values)
 
 
 def _kind(name: str, value: Any) -> tuple[tuple[Any, ...], Any]:
@@ -473,6 +474,3 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
     for inner in code.co_consts:
         if isinstance(inner, CodeType):
             yield from _codes(inner)
-
-
-Lifted = Callable[..., Any]
