@@ -101,7 +101,21 @@ def is_stale(airframe: Path) -> bool:
     """
     if is_recorded(airframe):
         return False
-    data(airframe), inner_loop(airframe)  # raises for what is no data
+    files = (airframe / "airframe.toml", airframe / "inner_loop.toml", written(airframe), model(airframe))
+    return _is_stale(airframe, tuple(map(_changed, files)))
+
+
+def _changed(file: Path) -> tuple[int, int] | None:
+    """When the file was changed, ns, and its size; None where there is none."""
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=64)  # each flight of a run asks
+def _is_stale(airframe: Path, changed: tuple[tuple[int, int] | None, ...]) -> bool:
     if written(airframe).is_file():
         return bool(_read(written(airframe)).get("data") != _data_hash(airframe))
     if adopted(airframe):
@@ -119,7 +133,12 @@ def _nameless(model: str) -> str:
 
 def _data_hash(airframe: Path) -> str:
     """A hash, 32 hex digits, of the data: of what they say, not of their comments."""
-    return _hashed(_text(airframe / "airframe.toml"), _text(airframe / "inner_loop.toml"))
+    texts = [_text(airframe / name) for name in ("airframe.toml", "inner_loop.toml")]
+    try:
+        return _hashed(*texts)
+    except (ValueError, RecursionError):
+        data(airframe), inner_loop(airframe)  # says which of them is no data
+        raise
 
 
 def data(airframe: Path) -> dict[str, Any]:
