@@ -221,6 +221,22 @@ def test_a_law_whose_file_has_changed_since_it_was_loaded_is_not_lifted(tmp_path
         module_of(step)
 
 
+class Turner:
+    """A function that has no hash."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __call__(self) -> float:
+        return 0.01
+
+
+def test_a_law_that_holds_what_has_no_hash_is_flown_by_python() -> None:
+    turner = Turner()
+    flight = replace(FLIGHT, law=OwnLaw(lambda: lambda o: turning(turner())))
+    assert engine.why_plain(flight).startswith("what it holds cannot be compared")
+    assert engine.simulate(flight).digest == loop.simulate(flight).digest
+
+
 def test_laws_with_the_same_step_and_other_constants_share_no_kernel(tmp_path: Path) -> None:
     shapes = []
     for constant in (1.0, 2.0):

@@ -52,8 +52,11 @@ def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
     """A function compiled, and what it is called with as its last argument. Raises `NotCompiledError`."""
     try:
         shape, numbers = held(function)
+        hash(shape)
     except NotLiftedError as error:
         raise NotCompiledError(str(error)) from None
+    except (TypeError, ValueError) as error:  # it holds what has no hash, or nothing yet
+        raise NotCompiledError(f"what it holds cannot be compared: {error}") from None
     if shape not in _KERNELS:
         try:
             _KERNELS[shape] = _loaded(function)

@@ -287,7 +287,7 @@ class _Writer(ast.NodeTransformer):
             return ast.Constant(False)
         if what is telling:
             return self._telling(node)
-        if what in (min, max) and len(node.args) > 1 and not node.keywords:
+        if (what is min or what is max) and len(node.args) > 1 and not node.keywords:
             name = "smaller" if what is min else "larger"
             first, *rest = [self.visit(argument) for argument in node.args]
             for each in rest:
