@@ -375,7 +375,7 @@ def rows_kept(flights: "pd.DataFrame") -> "pd.DataFrame":
     kept = flights[flights["plant"].isin(PLANTS)].drop(columns=["run", "version", "seconds"], errors="ignore")
     constant = [c for c in kept.columns if c.startswith(("estimator.", "target.", "wind.", "inner_loop.", "metrics."))]
     needed = ("wind.steady_mps", "wind.turbulence", "estimator.kind")
-    return with_predicted(kept.drop(columns=[c for c in constant if c not in needed])).reset_index(drop=True)
+    return kept.drop(columns=[c for c in constant if c not in needed]).reset_index(drop=True)
 
 
 def _folder() -> click.Path:
@@ -398,7 +398,7 @@ def _folder() -> click.Path:
 def main(directory: Path, gains: Path, laws: Path, readme: Path | None, rows: Path | None, out: Path) -> None:
     """Write OUT/does_it_hold.md from the flights of experiments/assumption.toml and quiet_gains.toml."""
     flights, assess, *_ = comparable([directory])
-    of_gains = comparable([gains]).flights
+    flights, of_gains = with_predicted(flights), with_predicted(comparable([gains]).flights)
     text, block = page(flights, of_gains, assess, (str(directory), str(gains)), laws.read_text(encoding="utf-8"))
     write(out, {"does_it_hold.md": text})
     if readme is not None:
