@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind fuzz clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind fuzz adopt-all clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -63,6 +63,9 @@ laws: install  ## fly every law in every air (ten minutes on two processors): do
 	$(BIN)/python -m harness.studies.floor
 	$(BIN)/harness run experiments/laws.toml --out out/laws --log none
 	$(BIN)/python -m harness.studies.which_law out/laws
+
+adopt-all: install  ## adopt every model that comes with JSBSim: docs/answers/adopted_models.md (ten minutes)
+	$(BIN)/python -m harness.studies.adopted_models
 
 bench: install  ## the speed of the loop, as ratios in one run, of the laws, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed

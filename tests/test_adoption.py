@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import aircraft
+from harness.adoption.model import source
 from harness.plants.model import data_root
 from harness.settings import load_flight
 from tests.builders import invoke, write
@@ -81,6 +82,14 @@ def test_a_command_without_a_standard_name_is_found_by_what_it_moves(tmp_path: P
     said = invoke("adopt", folder / "renamed.xml", "--out", tmp_path / "out")
     assert said.exit_code == 0, said.output
     assert aircraft.data(tmp_path / "out" / "renamed")["adopted"]["controls"]["aileron"] == "fcs/my-roll-cmd"
+
+
+def test_a_bare_name_is_a_model_of_jsbsim_whatever_folder_lies_about(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "c172p").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert source("c172p").root.get("name") == "c172"
 
 
 def test_a_mistake_in_a_map_of_controls_is_one_line(tmp_path: Path) -> None:

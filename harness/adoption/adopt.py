@@ -139,7 +139,8 @@ def _engine(a: Adoption) -> Found:
         thrusts.append(tunnel.thrust)
     low, high = thrusts
     if high - low < 1e-3 * a.mass * GRAVITY:
-        raise RefusalError("engine", f"throttle has no effect: thrust {low:.3g} N at 0.2 and {high:.3g} N at 1")
+        told = f"throttle has no effect: thrust {low:.3g} N at 0.2 and {high:.3g} N at 1"
+        raise RefusalError("engine", f"{told}{_whose(a, a.controls.throttles[0])}")
     told = f"{tunnel.engines} running, thrust {low:.3g} N at throttle 0.2, {high:.3g} N at 1"
     return replace(a, engine=told), told
 
@@ -165,8 +166,8 @@ def _controls(a: Adoption) -> Found:
 
 
 def _whose(a: Adoption, name: str) -> str:
-    writer = a.writers.get(name)
-    return f"; {writer} writes it too" if writer else ": use --controls"
+    writer = a.writers.get(name.replace("[0]", ""))
+    return f"; {writer} of the model writes {name}, too" if writer else ": use --controls"
 
 
 def _commands(a: Adoption) -> list[str]:

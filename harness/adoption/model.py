@@ -33,8 +33,9 @@ class Original:
 def source(name: str) -> Original:
     """The model in this file or folder, or of this name among those that come with JSBSim. Raises `RefusalError`."""
     path = Path(name)
-    if not path.exists() and path.name == name:
-        path = data_root() / "aircraft" / name / f"{name}.xml"
+    shipped = data_root() / "aircraft" / name / f"{name}.xml"
+    if path.name == name and path.suffix != ".xml" and shipped.exists():  # a bare name: no folder hides JSBSim's model
+        path = shipped
     if not path.exists():
         raise RefusalError("guard", f"{name} is neither a file MODEL.xml nor a model that comes with JSBSim")
     try:
@@ -72,7 +73,7 @@ def with_inner_loop(model: Original, inner_loop: str) -> str:
 def writers(root: Element) -> dict[str, str]:
     """Of each property that the model writes, the component that does."""
     return {
-        (output.text or "").strip(): f"<{component.tag} name={component.get('name', '')!r}>"
+        (output.text or "").strip().replace("[0]", ""): f"<{component.tag} name={component.get('name', '')!r}>"
         for component in root.iter()
         for output in component.findall("output")
     }

@@ -104,15 +104,14 @@ WORK = (
 )
 
 
-def identify(
-    airframe: Path, airspeed: float, done: Callable[[float], None] = lambda work: None, scale: float = 1.0
-) -> Identification:
+def identify(airframe: Path, airspeed: float, done: Callable[[float], None] = lambda work: None) -> Identification:
     """Flies, fits and validates at this airspeed, m/s; `done` is called after each part of `WORK`, with its size.
 
-    All commands are `scale` times those that suit a small aircraft at 13 m/s: a fast one turns slowly at a large bank.
+    The commands suit small aircraft; an adopted one has a share of them: a fast one turns slowly at a large bank.
 
     Raises `PlantError` when a manoeuvre cannot start, `End` when one ends early.
     """
+    scale = _scale(airframe, airspeed)
 
     def fly(command: Array, rate_trim: bool = True) -> Record:
         record = flown(airframe, airspeed, command * scale if scale != 1.0 else command, rate_trim)
@@ -134,7 +133,7 @@ def identify(
         airspeed=airspeed, heading_rate=heading_rate, bank=bank, hold=fit_airspeed(entries), bank_limit=limit,
         measured={}, errors={},
     )  # fmt: skip
-    errors = {name: _errors(fitted, fly(command)) for name, command in {**HELD_OUT, **CHATTER}.items()}
+    errors = {_told(name, scale): _errors(fitted, fly(command)) for name, command in {**HELD_OUT, **CHATTER}.items()}
     five = steps[STEPS_DEG_S.index(5.0)]
     measured = {
         "gain": five.gain, "lag_s": five.lag, "overshoot": five.overshoot, "turn_ratio": five.turn_ratio,
@@ -148,6 +147,18 @@ def identify(
         sweeps=sweeps,
         airspeed_error=(rms(change - entries[-1].output), rms(entries[-1].output)),
     )
+
+
+def _scale(airframe: Path, airspeed: float) -> float:
+    """What the commands are multiplied with: an adopted aircraft's largest stays within its bank."""
+    if not aircraft.adopted(airframe):
+        return 1.0
+    largest = 0.85 * float(rate_of_turn(np.array(airspeed), np.array(aircraft.limits(airframe).bank)))
+    return min(1.0, float(f"{largest / math.radians(STEPS_DEG_S[-1]):.2g}"))
+
+
+def _told(manoeuvre: str, scale: float) -> str:
+    return manoeuvre if scale == 1.0 else f"{scale:g} times the {manoeuvre}"
 
 
 def of_heading_rate(record: Record) -> Training:
