@@ -8,11 +8,13 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import harness
 from harness.verdict import grid
 from tests.builders import chromium, command, copied_airframe, invoke, result, results, write
+from tests.printed import sheets
 
 EXPERIMENT = """\
 title = "Two limits"
@@ -234,6 +236,21 @@ def test_a_browser_shows_all_of_the_page(page: Path, tmp_path: Path) -> None:
     assert dom.count("harness view") == 4  # the worst and the middle one, at the figure and in the table
     assert "Compared: plant = sixdof beside kinematic" in dom
     assert "CONSOLE" not in done.stderr  # where the browser says what the page's policy forbids
+
+
+def test_a_printed_page_has_no_heading_at_its_foot_and_no_sheet_that_is_almost_empty(
+    page: Path, tmp_path: Path
+) -> None:
+    printed = sheets(page, tmp_path)
+    sizes = [text.size for sheet in printed for text in sheet]
+    heading = 1.3 * float(np.median(sizes))
+    assert max(sizes) > heading
+    assert len(printed) > 1
+    for sheet in printed:
+        assert len(sheet) > 3
+        assert sheet[-1].size < heading
+    for sheet in printed[:-1]:
+        assert sheet[-1].at > 0.6
 
 
 def test_tables_sort_and_filter_in_the_browser(page: Path, tmp_path: Path) -> None:
