@@ -42,7 +42,7 @@ def tried(name: str) -> Tried:
             for stage, found in adopt(name, Path(folder), Wish()):
                 result.found[stage] = found
         except RefusalError as error:
-            result.refused = str(error)
+            result.refused = str(error).replace(f"{data_root()}/", "")
     return result
 
 
