@@ -120,6 +120,22 @@ def test_numbers_that_no_aircraft_has_are_no_samples() -> None:
     assert sampled(time, values, Basis.MEASURED, "").values.tolist() == [1.0, 2.0]
 
 
+def test_channels_that_do_not_overlap_or_hold_next_to_nothing_are_refused_and_break_nothing() -> None:
+    flight = log(1).recorded()
+
+    def moved(*names: str) -> RecordedFlight:
+        later = {name: replace(flight[name], time=flight[name].time + 1e4) for name in names}
+        return replace(flight, channels={**flight.channels, **later})
+
+    damaged = [
+        *(moved(name) for name in ("airspeed", "wind_east", "velocity_east", "bank", "bank_command")),
+        *(every(flight, name, 10**5) for name in ("bank", "airspeed", "velocity_north", "bank_command")),
+        flight.changed(np.zeros_like, "airspeed"),
+    ]
+    for each in damaged:
+        assert [line for line in lines(assess(each, 0.0, 200.0)) if "nan" in line] == []
+
+
 def test_too_few_turns_are_refused_with_the_number_that_is_needed() -> None:
     flight = log(1).recorded()
     finding = assess(flight, flight.begin, flight.begin + 30.0)[RELATION]

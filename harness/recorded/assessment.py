@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 CANNOT = "cannot be judged from this log"
 FLYING = 6.0  # m/s, over the ground or through the air: an aircraft at that speed flies
 SHORTEST = 10.0  # s of flight
+STOPPED = 1.0  # m/s: an airspeed sensor that shows less in flight shows nothing
+LEAST_TRACK = 20  # values of the ground velocity
+LEAST_IN_WINDOW = 6  # of them, in a window of turning flight
 WINDOW = 10.0  # s
 MOST_ALIKE = 0.4  # correlation of a window with the next: windows more alike than that are joined
 LEAST_LEAN = math.radians(2.0)  # rms of the bank about its mean, by which a lateral force is told from a zero offset
@@ -232,7 +235,11 @@ def _relation(flight: RecordedFlight, notes: list[str]) -> _Turning:
     if not flight.has("velocity_north", "velocity_east"):
         raise Refusal("the log has no velocity over the ground")
     track = air.track_of(flight)
+    if len(track.time) < LEAST_TRACK:
+        raise Refusal(f"too few samples: {len(track.time)} values of the velocity over the ground")
     measured = flight.has("airspeed") and flight["airspeed"].basis is Basis.MEASURED
+    known = track.airspeed[np.isfinite(track.airspeed)]
+    measured = measured and len(known) >= LEAST_TRACK and float(np.median(known)) > STOPPED
     if not measured:
         track = track._replace(airspeed=np.full(len(track.time), math.nan))
     if not measured and not flight.has("wind_north", "wind_east"):
@@ -240,6 +247,7 @@ def _relation(flight: RecordedFlight, notes: list[str]) -> _Turning:
     estimate = air.estimated(flight, track)
     fixed = _fixed_wind(track, estimate, measured=measured)
     windows = turn.windows(flight["bank"])
+    windows = [window for window in windows if _sampled_in(track, window)]
     steep = [window for window in windows if window.steepest > turn.STEEPEST]
     windows = [window for window in windows if window.steepest <= turn.STEEPEST]
     if len(windows) < LEAST_SEEDS:
@@ -250,6 +258,11 @@ def _relation(flight: RecordedFlight, notes: list[str]) -> _Turning:
     turning = _jackknifed(flight["bank"], track, windows, fixed)
     _say(notes, turning, estimate, steep)
     return replace(turning, estimated=estimate)
+
+
+def _sampled_in(track: GroundTrack, window: TurnWindow) -> bool:
+    first, last = np.searchsorted(track.time, (window.begin, window.end))
+    return bool(last - first >= LEAST_IN_WINDOW)
 
 
 def _fixed_wind(track: GroundTrack, estimate: Estimated | None, *, measured: bool) -> Fit | None:
@@ -377,8 +390,9 @@ def _airspeed(flight: RecordedFlight) -> _Made:
     if not flight.has("airspeed") or flight["airspeed"].basis is not Basis.MEASURED:
         raise Refusal("the log has no measured airspeed")
     channel = flight["airspeed"]
-    usual = float(np.median(channel.values))
-    # a command of another scale than the measurement is no deviation
+    usual = float(np.median(channel.values))  # not the command: the sensor's scale is no deviation
+    if usual <= STOPPED:
+        raise Refusal(f"the airspeed sensor shows {usual:.1f} m/s in flight")
     time, values = averaged(channel, 1.0)
     return _Made(_windowed(time, np.abs(values / usual - 1.0), _rms), "from the flight's median")
 

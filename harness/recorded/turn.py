@@ -57,6 +57,8 @@ def windows(bank: Channel) -> list[TurnWindow]:
     time = np.arange(bank.time[0], bank.time[-1], _GRID)
     values = bank.at(time)
     width = max(1, round(_SMOOTHED / _GRID))
+    if len(time) < width:
+        return []
     smooth = np.convolve(np.nan_to_num(values), np.ones(width) / width, mode="same")
     sign = np.where(np.abs(smooth) >= LEAST_BANK, np.sign(smooth), 0.0)
     sign[np.isnan(values)] = 0.0
@@ -110,6 +112,8 @@ def _rows(track: GroundTrack, of: Integrals, wind: Fit, at: Sequence[TurnWindow]
         columns = [angle[here], np.interp(time[here], of.time, turn), np.interp(time[here], of.time, drift)]
         centred = [column - column.mean() for column in columns]
         parts.append((centred[0], centred[1], centred[2], np.full(last - first, i)))
+    if not parts:
+        return _Rows(np.empty(0), np.empty(0), np.empty(0), np.empty(0, np.intp))
     return _Rows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
@@ -122,7 +126,7 @@ def relation(
     found, *_ = np.linalg.lstsq(columns, rows.angle, rcond=None)
     off = rows.angle - columns @ found
     slope = float(found[0])
-    return TurnRelation(slope, float(found[1]) / slope if bank_error else 0.0), float(off @ off)
+    return TurnRelation(slope, float(found[1]) / slope if bank_error and slope else 0.0), float(off @ off)
 
 
 def age_of(track: GroundTrack, of: Integrals, wind: Fit, at: Sequence[TurnWindow], *, bank_error: bool) -> float:

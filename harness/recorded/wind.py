@@ -107,7 +107,7 @@ def misfit(track: GroundTrack, north: float, east: float) -> float:
     known = np.isfinite(track.airspeed)
     size = np.hypot(track.north[known] - north, track.east[known] - east)
     airspeed = track.airspeed[known]
-    scale = float(size @ airspeed / (airspeed @ airspeed))
+    scale = float(size @ airspeed / max(float(airspeed @ airspeed), 1e-9))
     return float(np.sqrt(np.mean((size - scale * airspeed) ** 2)))
 
 
@@ -119,6 +119,8 @@ def estimated(flight: RecordedFlight, track: GroundTrack) -> Estimated | None:
     wind = np.column_stack([flight["wind_north"].values, flight["wind_east"].at(time)])
     known = np.isfinite(wind).all(axis=1)
     time, wind = time[known], wind[known]
+    if not len(wind):
+        return None
     end = np.median(wind[-max(1, len(wind) // 4) :], axis=0)
     away = np.flatnonzero(np.hypot(*(wind - end).T) > SETTLED_WITHIN)
     first = int(away[-1]) + 1 if len(away) else 0
