@@ -173,7 +173,7 @@ CALLS: Mapping[str, Sequence[str]] = {
     "show": ["RUN", "RUN:KEY", "RUN --where SET --sort WORD", "RUN --columns WORD --csv", "WORD", "RUN:WORD"],
     "compare": [
         "RUN", "RUN --json --set SET", "RUN --by WORD --baseline WORD", "RUN --where SET", "RUN --by seed --latex",
-        "RUN --where WORD --csv",
+        "RUN --where WORD --csv", "RUN --variance-reduction --where SET",
     ],
     "report": ["RUN --out OUT/a.html", "RUN --markdown OUT/a.md --set SET", "RUN --out OUT/a.html --by WORD"],
     "demo": ["--out /dev/null"],

@@ -19,6 +19,12 @@ from harness.cli._setting import MARGIN, SETTING
     "--set", "overrides", multiple=True, type=MARGIN, metavar="assess.KEY=VALUE", help="Set a margin; repeatable."
 )
 @click.option("--map", "mapped", metavar="METRIC", help="Print this metric over the two numeric axes alone.")
+@click.option(
+    "--variance-reduction",
+    "reducing",
+    is_flag=True,
+    help="Print means and shares of the highest plant alone, with a cheaper one as a control variate.",
+)
 @click.option("--json", "form", flag_value="json", help="Print everything as one JSON object.")
 @click.option("--csv", "form", flag_value="csv", help="Print the paired differences as CSV.")
 @click.option("--latex", "form", flag_value="latex", help="Print the paired differences as a LaTeX tabular.")
@@ -29,6 +35,7 @@ def compare(
     where: tuple[str, ...],
     overrides: tuple[str, ...],
     mapped: str | None,
+    reducing: bool,
     form: str | None,
 ) -> None:
     """Compare the flights of a run that differ in one setting alone.
@@ -40,6 +47,11 @@ def compare(
     within its margin, or which metrics differ, with 95 % intervals. The margins are the table [assess] of the
     experiment's file, see `harness list margins`.
 
+    With --variance-reduction the flights of the cheaper plants narrow the intervals of the highest plant's own means
+    and shares: both have to be flown with the same seeds, and a cheaper one with many more (fly FILE into DIR again
+    with --set plant and --set seed). Prints both intervals, and the factor of flights and of time that this saves,
+    where it saves 2 or more of the flights.
+
     \b
     Examples:
       harness compare out/wind
@@ -47,29 +59,42 @@ def compare(
       harness compare out/gains --map range_error_rms_m
       harness compare out/laws --by law.name --baseline smc --where plant=sixdof
       harness compare out/before out/after
+      harness compare out/monte_carlo --variance-reduction
     """
     import json
 
     from harness.cli._comparison import read_comparison
     from harness.cli._input import BadInput
     from harness.cli._progress import busy
-    from harness.verdict.export import as_csv, as_document, as_latex
+    from harness.verdict.control_variates import lines as reduced_lines
+    from harness.verdict.control_variates import records, reductions
+    from harness.verdict.export import as_csv, as_document, as_latex, plain
     from harness.verdict.pairs import CompareError
     from harness.verdict.text import lines
 
+    if reducing and (mapped is not None or form in ("csv", "latex")):
+        raise BadInput("--variance-reduction excludes --map, --csv and --latex: it prints its own table, or --json")
     with busy("comparing"):
         comparison, _ = read_comparison(directories, overrides, by, baseline, where)
+    place = " and ".join(map(str, directories))
+    try:
+        found = reductions(comparison.table) if reducing else []
+    except CompareError as error:
+        raise BadInput(f"{place}: {error}") from None
     match form:
         case "json":
-            click.echo(json.dumps(as_document(comparison), allow_nan=False))
+            document = as_document(comparison)
+            if reducing:
+                document["variance_reduction"] = plain(records(found))
+            click.echo(json.dumps(document, allow_nan=False))
         case "csv":
             click.echo(as_csv(comparison), nl=False)
         case "latex":
             click.echo(as_latex(comparison), nl=False)
         case _:
             try:
-                text = list(lines(comparison, mapped))
+                text = list(reduced_lines(found, place) if reducing else lines(comparison, mapped))
             except CompareError as error:
-                raise BadInput(f"{' and '.join(map(str, directories))}: {error}") from None
+                raise BadInput(f"{place}: {error}") from None
             for line in text:
                 click.echo(line)

@@ -47,8 +47,8 @@ def as_document(comparison: Comparison) -> dict[str, Any]:
             for card in comparison.scorecards
         ],
     }
-    plain: dict[str, Any] = _plain(document)
-    return plain
+    fit: dict[str, Any] = plain(document)
+    return fit
 
 
 def _conclusion(conclusion: Any) -> dict[str, Any]:
@@ -67,20 +67,21 @@ def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """The value as JSON can hold it: NaN is null, infinity `inf`."""
     match value:
         case dict():
-            return {str(key): _plain(inner) for key, inner in value.items()}
+            return {str(key): plain(inner) for key, inner in value.items()}
         case list() | tuple():
-            return [_plain(inner) for inner in value]
+            return [plain(inner) for inner in value]
         case bool() | str() | None:
             return value
         case _ if value is pd.NA:
             return None
         case _ if is_dataclass(value) and not isinstance(value, type):
-            return _plain(asdict(value))
+            return plain(asdict(value))
         case _ if hasattr(value, "item"):  # numpy's
-            return _plain(value.item())
+            return plain(value.item())
         case float():
             return "inf" if value == math.inf else value if math.isfinite(value) else None
         case _:
