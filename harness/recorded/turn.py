@@ -63,7 +63,7 @@ def windows(bank: Channel) -> list[TurnWindow]:
     sign = np.where(np.abs(smooth) >= LEAST_BANK, np.sign(smooth), 0.0)
     sign[np.isnan(values)] = 0.0
     begins = np.flatnonzero(np.diff(sign, prepend=0.0) != 0.0)
-    ends = np.append(begins[1:], len(sign))
+    ends = np.append(begins, len(sign))[1:]
     found = []
     for begin, end in zip(begins, ends, strict=True):
         if sign[begin] == 0.0:

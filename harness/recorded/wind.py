@@ -86,6 +86,8 @@ def change(track: GroundTrack) -> tuple[float, float]:
 def _fitted(track: GroundTrack, used: NDArray[np.bool_] | None, *, changing: bool) -> Array:
     """Wind north and east in the middle, scale, and the change of the wind from beginning to end; by Gauss-Newton."""
     known = np.isfinite(track.airspeed) if used is None else used & np.isfinite(track.airspeed)
+    if known.sum() < 5:  # a piece left out held nearly all that is known: the interval is to be wide
+        return np.array([0.0, 0.0, 1.0, 0.0, 0.0])
     v, airspeed = np.stack([track.north[known], track.east[known]]), track.airspeed[known]
     since = (track.time[known] - track.time.mean()) / (track.time[-1] - track.time[0])
     x = np.array([0.0, 0.0, float(np.hypot(*v).mean() / airspeed.mean()), 0.0, 0.0])
