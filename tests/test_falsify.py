@@ -7,6 +7,7 @@ import pytest
 
 import harness
 from benchmarks.planted_failures import flights_needed, needed_at_random
+from harness.review.reading import read_logs
 from harness.settings import load_flight
 from harness.verdict.statistics import upper_bound
 from tests.builders import command, invoke, write
@@ -49,6 +50,9 @@ def test_the_counterexample_breaks_the_requirement_when_it_is_flown_again(file: 
     results = harness.load_results(tmp_path / "out").set_index("key")
     assert again["metrics"]["range_error_peak_m"] == results["range_error_peak_m"].max() > 5.0
     assert again["key"] in results.index
+    done = invoke("view", tmp_path / "out" / "counterexample.toml", "--save", tmp_path / "a.rrd")
+    assert done.exit_code == 0, done.output
+    assert read_logs(tmp_path / "a.rrd")["kinematic"].digest == again["digest"]
 
 
 def test_a_search_is_the_same_on_any_number_of_workers_and_when_it_is_resumed(file: Path, tmp_path: Path) -> None:

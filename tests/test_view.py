@@ -115,6 +115,7 @@ def test_an_exported_log_is_the_flight_to_the_last_bit(plant: str, out: Path, tm
         (["view", "{out}", "--flight", "zz"], "no flight has a key that begins with 'zz'"),
         (["view", "{out}", "--flight", "a", "--pair", "b"], "--pair and --flight exclude each other"),
         (["view", "{out}", *["--flight", "a"] * 7], "--flight is given 7 times, must be at most 6"),
+        (["view", "experiments/stationary.toml", "--flight", "a"], "--flight is for a folder or a recording"),
         (["view", "no/such/place"], "no/such/place: no such file or folder"),
         (["view", "--save", "a.rrd"], "--web require a folder or a file"),
         (["view", "{out}/journal.sqlite", "--flight", "a"], "is not a complete recording"),

@@ -55,10 +55,10 @@ def falsify(
     decade or more is searched by factors). They give a 95 % upper bound on the share of the ranges that breaks the
     requirement. That none was found proves nothing.
 
-    Writes OUT/counterexample.toml, which `harness fly` takes, and OUT/trials.csv. The result does not depend on the
-    number of workers. The same command resumes an interrupted search, and goes on with more --flights; the flights are
-    rows of OUT as of `harness run`. Exit code 0 whether a counter-example is found or not; 1 when a flight failed
-    (invalid, timeout, worker_died).
+    Writes OUT/counterexample.toml, which `harness fly` and `harness view` take, and OUT/trials.csv. The result does
+    not depend on the number of workers. The same command resumes an interrupted search, and goes on with more
+    --flights; the flights are rows of OUT as of `harness run`. Exit code 0 whether a counter-example is found or
+    not; 1 when a flight failed (invalid, timeout, worker_died).
 
     \b
     Examples:
@@ -118,7 +118,7 @@ def falsify(
     if as_json:
         click.echo(_json(search, counterexample))
     else:
-        _print_found(search, out, counterexample)
+        _print_found(search, counterexample)
         click.echo(
             f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}, all "
             f"trials in {table}"
@@ -126,7 +126,7 @@ def falsify(
     raise SystemExit(1 if progress.failed else 0)
 
 
-def _print_found(search: Falsification, out: Path, counterexample: Path | None) -> None:
+def _print_found(search: Falsification, counterexample: Path | None) -> None:
     """The worst trials, the counter-example or that there is none, and what the uniform trials say."""
     from collections import Counter
 
@@ -160,12 +160,7 @@ def _print_found(search: Falsification, out: Path, counterexample: Path | None) 
         f"{bound.share:.2%} of the ranges does"
     )
     if counterexample:
-        click.echo(f"next: harness fly {counterexample}, or harness view {out}:{_key(search)}")
-
-
-def _key(search: Falsification) -> str:
-    """The beginning of the key of the counter-example."""
-    return search.broken[0].candidate.keys[search.broken[0].decisive][:12]
+        click.echo(f"next: harness fly {counterexample}, or harness view {counterexample}")
 
 
 def _json(search: Falsification, counterexample: Path | None) -> str:

@@ -57,12 +57,10 @@ def fly(
       harness fly experiments/stationary.toml --live --pace 10
       harness fly out/wind:3f2a --set wind.steady_mps=[0.0,0.0] --against out/wind:3f2a
     """
-    from harness.checks import model_of_another
     from harness.cli._input import BadInput, flight_of, read_file, typed
     from harness.cli._paths import writable
     from harness.feasibility import feasibility_line, warnings
     from harness.key import identity
-    from harness.runs import apart
     from harness.runs.description import changes, ending, flown, metric_lines
     from harness.runs.recall import row_address
     from harness.runs.row import json_of, result_of, row
@@ -89,7 +87,7 @@ def fly(
     own = source_of(flight.law) is not None
     for warning in [*warnings(flight, of_circle=False), *(slowness(flight) if own else ())]:
         click.echo(f"warning: {warning}", err=True)
-    log = _watched(flight, stream) if own and model_of_another(flight) is None else apart.fly(flight, stream)
+    log = log_of(flight, stream)
     if stream:
         stream.finish(log, typed())
         if stream.gone:
@@ -119,6 +117,16 @@ def fly(
         click.echo(f"outcome: {log.outcome}{f': {log.reason}' if log.reason else ''}")
         click.echo(f"key {flight_row['key']}  digest {flight_row['digest']}")
     raise SystemExit(1 if log.outcome.failed else 0)
+
+
+def log_of(flight: Flight, stream: Live | None = None) -> FlightLog:
+    """The flight flown: by itself, or where its law is the user's or its aircraft another's, so that it cannot hang."""
+    from harness.checks import model_of_another
+    from harness.runs import apart
+    from harness.settings.laws import source_of
+
+    own = source_of(flight.law) is not None
+    return _watched(flight, stream) if own and model_of_another(flight) is None else apart.fly(flight, stream)
 
 
 def _watched(flight: Flight, stream: Live | None) -> FlightLog:

@@ -16,7 +16,7 @@ _MOST_OFFERED = 20  # flights, where none is chosen
 
 
 @click.command()
-@click.argument("what", metavar="[DIR|DIR:KEY|FILE.rrd]", type=PATH_OR_ROW, required=False)
+@click.argument("what", metavar="[DIR|DIR:KEY|FILE.rrd|FILE.toml]", type=PATH_OR_ROW, required=False)
 @click.option(
     "--flight", "flights", multiple=True, metavar="KEY", help="A flight to show, up to 6; the first is the reference."
 )
@@ -27,11 +27,11 @@ _MOST_OFFERED = 20  # flights, where none is chosen
 def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Path | None, web: bool, port: int) -> None:
     """Open flights in the Rerun viewer.
 
-    Several flights share one scene and the same plots. The beginning of a KEY is enough; for a FILE.rrd with several
-    flights, KEY is the name of a flight. A flight without a recording is flown again and compared with what is
-    stored. Without arguments an empty viewer opens, for `harness fly --live`. With --save prints the file written. With
-    --web, for a machine without a screen, prints the address to open and the SSH tunnel to type, and listens on
-    127.0.0.1 alone.
+    Several flights share one scene and the same plots. The beginning of a KEY is enough; for a FILE.rrd with
+    several flights, KEY is the name of a flight. A flight without a recording is flown again and compared with what
+    is stored; a FILE.toml, such as the counter-example of `harness falsify`, is flown. Without arguments an empty
+    viewer opens, for `harness fly --live`. With --save prints the file written. With --web, for a machine without a
+    screen, prints the address to open and the SSH tunnel to type, and listens on 127.0.0.1 alone.
 
     \b
     Examples:
@@ -39,6 +39,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
       harness view out/wind --flight 3f2a --flight 9c01
       harness view out/wind --pair 3f2a --save pair.rrd
       harness view out/wind --pair 3f2a --web
+      harness view out/falsify/counterexample.toml
     """
     import tempfile
 
@@ -96,6 +97,10 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
     if path.is_file():
         if pair is not None:
             raise BadInput(f"{what}: is a file; --pair is for a folder that `harness run` wrote")
+        if path.suffix == ".toml":
+            if flights:
+                raise BadInput(f"{what}: is one flight; --flight is for a folder or a recording")
+            return _of_settings(path)
         return _of_file(path, flights)
     place = row_address(what)
     if place is not None:
@@ -113,6 +118,15 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
         return distinctly_named(pair_of_row(path, pair, say))
     except (StoreError, SettingsError, ValueError) as error:
         raise BadInput(str(error)) from None
+
+
+def _of_settings(path: Path) -> dict[str, FlightLog]:
+    """The flight of a settings file, flown."""
+    from harness.cli._input import flight_of, read_file
+    from harness.cli.fly import log_of
+
+    flight = flight_of(read_file(path, ()))
+    return {flight.plant: log_of(flight)}
 
 
 def _rows(folder: Path, keys: tuple[str, ...]) -> list[FlightLog]:
