@@ -1,6 +1,9 @@
 """A search for the flight that breaks a requirement: planted failures, real ones, and what is said of none."""
 
 import json
+import os
+import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,7 +13,8 @@ from benchmarks.planted_failures import flights_needed, needed_at_random
 from harness.review.reading import read_logs
 from harness.settings import load_flight
 from harness.verdict.statistics import upper_bound
-from tests.builders import command, invoke, write
+from tests.builders import command, invoke, words_of, write
+from tests.test_faults import runs_of, until
 
 KINEMATIC = """\
 [flight]
@@ -76,6 +80,23 @@ def test_of_none_the_bound_is_that_of_the_uniform_trials_alone(file: Path, tmp_p
     assert uniform["share"] == pytest.approx(1.0 - 0.05 ** (1.0 / uniform["trials"]))  # Clopper and Pearson, of none
     assert "safe" not in out
     assert not (tmp_path / "out" / "counterexample.toml").exists()
+
+
+def test_ctrl_c_keeps_what_was_flown_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    file, out = write(tmp_path / "long.toml", KINEMATIC.replace("60.0", "300.0")), tmp_path / "out"
+    asked = ("--requirement", "convergence_time_s < 30", "--flights", 60, "--workers", 2)
+    words = ("falsify", file, "--out", out, *OVER, *asked)
+    process = subprocess.Popen(
+        words_of(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    until(lambda: runs_of(out), process)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 130, errors
+    assert errors.splitlines()[-1] == "interrupted"
+    kept = len(runs_of(out))
+    assert 0 < kept < 60
+    assert f"{60 - kept} flown, {kept} earlier, 0 failed" in command(*words).stdout
 
 
 def test_the_upper_bound_holds_the_share_in_95_of_100_cases() -> None:
