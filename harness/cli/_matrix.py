@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from harness.cli._input import BadInput
 from harness.cli._progress import busy, duration, of_run
 
 if TYPE_CHECKING:
+    from harness.runs.cluster import Cluster
     from harness.runs.matrix import Matrix
     from harness.runs.run import Options, Progress
     from harness.runs.survey import Survey
@@ -22,8 +24,23 @@ _MOST_REASONS = 5
 _MOST_WARNINGS = 10
 
 
-def processes(workers: int | None, flight_timeout: float | None) -> int:
+@contextmanager
+def cluster(scheduler: str | None) -> Iterator[Cluster | None]:
+    """The Dask cluster of a scheduler, if one is named. Raises `ClusterError`."""
+    from harness.runs.cluster import connected
+
+    if scheduler is None:
+        yield None
+        return
+    with connected(scheduler) as many:
+        click.echo(f"{counted(many.workers, 'worker')} at {scheduler}")
+        yield many
+
+
+def processes(workers: int | None, flight_timeout: float | None, dask: str | None = None) -> int:
     """The number of workers: one per processor unless told. BadInput for a time limit that cannot be kept."""
+    if workers is not None and dask is not None:
+        raise BadInput("--workers is for processes of this machine, --dask has workers of its own: leave one out")
     if flight_timeout is not None and not flight_timeout > 0:
         raise BadInput(f"--flight-timeout is {flight_timeout:g}, must be > 0")
     if flight_timeout is not None and workers == 0:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 @click.argument("file", type=PATH)
 @click.option("--out", type=PATH, help="The folder of the results; required without --dry-run.")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
+@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--limit", type=click.IntRange(1), metavar="N", help="Fly the first N flights of the matrix only.")
 @click.option(
     "--shard", metavar="I/N", help="Fly the I-th of N parts, each on a machine of its own; see harness merge."
@@ -47,6 +48,7 @@ def run(
     file: Path,
     out: Path | None,
     workers: int | None,
+    dask: str | None,
     limit: int | None,
     shard: str | None,
     log: str | None,
@@ -69,9 +71,10 @@ def run(
       harness run experiments/wind.toml --out out/wind --retry failed
       harness run experiments/stationary.toml --out out/k2 --set 'law.k2=[1,3,12]' --set 'seed={start=0,count=8}'
       harness run experiments/wind.toml --out out/wind_2 --shard 2/4
+      harness run experiments/wind.toml --out out/wind --dask 127.0.0.1:8786
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import engine_of, fly_matrix, print_survey, print_time, processes, surveyed
+    from harness.cli._matrix import cluster, engine_of, fly_matrix, print_survey, print_time, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.error import HarnessError
     from harness.runs.matrix import read_matrix
@@ -81,7 +84,7 @@ def run(
 
     if out is None and not dry_run:
         raise BadInput("--out DIR is missing: the folder of the results")
-    workers = processes(workers, flight_timeout)
+    workers = processes(workers, flight_timeout, dask)
     try:
         matrix = replace(read_matrix(read_settings(file, overrides), draft=True), shard=_shard(shard))
         done = positions_done(matrix, out, retry_failed=retry is not None) if out else {}
@@ -92,18 +95,18 @@ def run(
         if dry_run or out is None:
             print_time(size, len(done), max(1, workers), log)
             return
-        compiled = engine_of(size, engine)
-        timeout = flight_timeout or TIMEOUT
-        options = Options(
-            workers=workers,
-            limit=limit,
-            log=log,
-            retry_failed=retry is not None,
-            timeout=timeout,
-            typical=size.typical,
-            compiled=compiled,
-        )
-        progress = fly_matrix(matrix, out, options)
+        with cluster(dask) as many:
+            options = Options(
+                workers=many.workers if many else workers,
+                limit=limit,
+                log=log,
+                retry_failed=retry is not None,
+                timeout=flight_timeout or TIMEOUT,
+                typical=size.typical,
+                compiled=engine_of(size, engine),
+                cluster=many,
+            )
+            progress = fly_matrix(matrix, out, options)
     except HarnessError as error:
         raise BadInput(str(error)) from None
     except OSError as error:

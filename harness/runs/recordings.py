@@ -9,14 +9,17 @@ from harness.plants.plant import Outcome
 FOLDER = "flights"
 
 
-def record(log: FlightLog, key: str, folder: Path) -> str:
-    """Writes the recording of a flight. Returns what went wrong in one line, or an empty string."""
+def record(log: FlightLog, key: str, folder: Path, home: Path) -> str:
+    """Writes the recording of a flight of the run in `home` to `folder`.
+
+    Returns what went wrong in one line, or an empty string.
+    """
     from harness.review.recording import write_recording
 
     path = recording_path(folder, key)
     try:
         make_folder(path.parent)
-        write_recording(path, {log.flight.plant: log}, key, command=f"harness fly {folder}:{key}")
+        write_recording(path, {log.flight.plant: log}, key, command=f"harness fly {home}:{key}")
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
     return ""

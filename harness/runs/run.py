@@ -2,7 +2,7 @@
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from typing import NamedTuple
 from harness.key import Identity, files, identity, version_of
 from harness.plants.plant import Outcome
 from harness.provenance import decided_bits, decides_bits, differences, provenance
+from harness.runs.cluster import Cluster
 from harness.runs.matrix import Matrix
 from harness.runs.recordings import lacks_recording, recording_path
 from harness.runs.row import row
@@ -35,6 +36,7 @@ class Options:
     typical: Mapping[str, float] = field(default_factory=dict)  # s: wall time of the flights to fly, by plant
     compiled: bool = False  # flown by compiled loops where that can be
     fly: Fly = fly_task
+    cluster: Cluster | None = None  # whose workers fly, in place of processes of this machine
 
 
 @dataclass(slots=True)
@@ -86,9 +88,7 @@ def flown(
     time_left: TimeLeft,
 ) -> Iterator[Done | None]:
     """Flies the tasks, each entered in `pending` by its key, and keeps and counts them: see `fly_all`."""
-    flying = fly_all(
-        tasks, store.folder, workers=options.workers, wall_time=WallTime(), timeout=options.timeout, fly=options.fly
-    )
+    flying = _flying(tasks, store.folder, options)
     begin = time.monotonic()
     try:
         for done in flying:
@@ -101,6 +101,15 @@ def flown(
             yield done
     finally:
         flying.close()
+
+
+def _flying(tasks: Iterator[Task | None], folder: Path, options: Options) -> Generator[Done | None]:
+    if options.cluster:
+        seconds = sum(options.typical.values())
+        return options.cluster.fly_all(tasks, folder, wall_time=WallTime(), timeout=options.timeout, seconds=seconds)
+    return fly_all(
+        tasks, folder, workers=options.workers, wall_time=WallTime(), timeout=options.timeout, fly=options.fly
+    )
 
 
 def warn_of_flights_from_elsewhere(store: Store) -> None:

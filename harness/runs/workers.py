@@ -79,8 +79,11 @@ class Done(NamedTuple):
 Fly = Callable[[Task, Path], WorkerResult]
 
 
-def fly_task(task: Task, folder: Path) -> WorkerResult:
-    """Flies a task, in a worker, and writes its recording if the task asks for one."""
+def fly_task(task: Task, folder: Path, home: Path | None = None) -> WorkerResult:
+    """Flies a task, in a worker, and writes its recording if the task asks for one.
+
+    `home` is the folder of the run, where that is another than the one to write to.
+    """
     begin, problem = time.perf_counter(), ""
     try:
         log = simulate_safely(task.flight, _note, compiled=task.compiled, in_worker=bool(_SHARED))
@@ -89,7 +92,7 @@ def fly_task(task: Task, folder: Path) -> WorkerResult:
     except MemoryError:
         return WorkerResult(failed_result(Outcome.WORKER_DIED, OUT_OF_MEMORY), version_of(task.flight).number)
     if wanted(task.record, log.outcome):
-        problem = record(log, task.key, folder)
+        problem = record(log, task.key, folder, home or folder)
     return WorkerResult(result, version_of(task.flight).number, problem)
 
 

@@ -1,0 +1,230 @@
+"""Runs on a real Dask cluster: a scheduler and two workers on loopback, each a process that the tests kill."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+import pytest
+
+import harness
+from harness.runs.cluster import _unfit
+from harness.runs.far import Report, versions
+from harness.runs.store import StoreError, reading
+from tests.builders import HERE, ROOT, command, copied_airframe, digests, fly_matrix, invoke, words_of, write
+
+LAW = '''
+import os, signal
+from dataclasses import dataclass
+from autopilot.guidance import Context, LawStep
+from autopilot.laws import law
+from lying_beside import STANDOFF
+
+@dataclass(frozen=True)
+class Mine:
+    """The paper's law, which may end its process and the worker above it."""
+
+    standoff: float = STANDOFF
+    max_heading_rate: float = 0.3
+    deadly: bool = False
+    command = "heading_rate"
+
+    def start(self, context: Context) -> LawStep:
+        if self.deadly:
+            os.kill(os.getppid(), signal.SIGKILL)
+            os.kill(os.getpid(), signal.SIGKILL)
+        return law("nftsm", "paper_1").start(context)
+
+    def broken_conditions(self, speed_ratio: float) -> list[str]:
+        return []
+'''
+MATRIX = """\
+[flight]
+duration_s = 60.0
+aircraft = "mine/my_wing"
+[flight.law]
+name = "mine/law.py:Mine"
+[flight.target]
+track = "mine/track.csv"
+[matrix]
+plant = ["kinematic", "coordinated"]
+"start.heading_deg" = { uniform = [0.0, 360.0] }
+seed = { start = 0, count = 24 }
+"""
+
+
+class Cluster(NamedTuple):
+    scheduler: str  # its file
+    workers: list[int]  # the processes that start them again
+
+
+def _started(folder: Path, *words: str) -> subprocess.Popen[bytes]:
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "FAR_AWAY": "1", "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    with (folder / "cluster.log").open("ab") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", *words, "--no-dashboard", "--host", "127.0.0.1"],
+            stdout=log, stderr=log, env=env, cwd=folder,
+        )  # fmt: skip
+
+
+def _until(true: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60.0
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _worker(folder: Path, file: Path, *words: str) -> subprocess.Popen[bytes]:
+    given = ("--scheduler-file", str(file), "--local-directory", str(folder / "local"), *words)
+    return _started(folder, "distributed.cli.dask_worker", *given)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    folder = tmp_path_factory.mktemp("cluster")
+    file = folder / "scheduler.json"
+    processes = [_started(folder, "distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", str(file))]
+    processes += [_worker(folder, file, "--nthreads", "1") for _ in range(2)]
+    _until(lambda: (folder / "cluster.log").read_text().count("Registered to:") == 2)
+    yield Cluster(str(file), [process.pid for process in processes[1:]])
+    for process in reversed(processes):
+        with suppress(psutil.NoSuchProcess):
+            for child in psutil.Process(process.pid).children(recursive=True):
+                child.kill()
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """A matrix whose law, airframe and track are the user's own."""
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    copied_airframe("aerosonde", mine / "my_wing")
+    write(mine / "law.py", LAW)
+    write(mine / "lying_beside.py", "STANDOFF = 200.0\n")
+    write(mine / "track.csv", "time_s,north_m,east_m\n" + "".join(f"{t},{t},0\n" for t in range(62)))
+    return write(tmp_path / "many.toml", MATRIX)
+
+
+def _rows(out: Path) -> int:
+    with suppress(StoreError), reading(out) as journal:
+        ((count,),) = journal.execute("SELECT count(*) FROM flights")
+        return int(count)
+    return 0
+
+
+def test_client_and_worker_are_killed_and_the_rows_are_those_of_a_run_at_home(
+    cluster: Cluster, file: Path, tmp_path: Path
+) -> None:
+    far, home = tmp_path / "far", tmp_path / "home"
+    words = words_of("run", file, "--out", far, "--dask", cluster.scheduler)
+    for ended_by, code in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)):
+        before = _rows(far)
+        client = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        _until(lambda before=before: _rows(far) > before)  # type: ignore[misc]
+        client.send_signal(ended_by)
+        assert client.wait(20) == code
+    kept = _rows(far)
+    assert 0 < kept < 48
+    resumed = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    _until(lambda: _rows(far) > kept)
+    for process in psutil.Process(cluster.workers[0]).children(recursive=True):
+        process.kill()
+    said, _ = resumed.communicate(timeout=100)
+    assert resumed.returncode == 0
+    assert f"{48 - kept} flown, {kept} earlier, 0 failed" in said
+    fly_matrix(file, home, options=replace(HERE, log=None))
+    assert digests(far) == digests(home)
+    recorded = {path.name for path in (home / "flights").iterdir()}
+    assert {path.name for path in (far / "flights").iterdir()} == recorded
+    again = command("fly", f"{far}:{next(iter(digests(far)))}")
+    assert again.returncode == 0
+    assert "differs" not in again.stdout + again.stderr
+
+
+def test_a_flight_that_ends_every_worker_is_one_row(cluster: Cluster, file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    axes = ["law.deadly=[false, true]", "seed=[1]", "plant=['kinematic', 'coordinated']", "duration_s=2"]
+    sets = [word for axis in axes for word in ("--set", axis)]
+    axis = 'exclude = [{ plant = "coordinated", "law.deadly" = true }]\n'
+    write(file, axis + MATRIX)
+    done = command("run", file, "--out", out, "--log", "none", "--dask", cluster.scheduler, *sets)
+    assert done.returncode == 1, done.stderr
+    outcomes = harness.load_results(out).set_index("law.deadly")["outcome"]
+    assert outcomes[True] == "worker_died"
+    assert set(outcomes[False]) == {"completed"}
+
+
+def test_a_law_that_cannot_be_loaded_on_a_worker_is_told_and_no_row(
+    cluster: Cluster, file: Path, tmp_path: Path
+) -> None:
+    write(file.parent / "mine" / "law.py", 'import os\nif "FAR_AWAY" in os.environ:\n    import not_there\n' + LAW)
+    done = command("run", file, "--out", tmp_path / "out", "--dask", cluster.scheduler)
+    assert done.returncode == 2
+    assert "a law cannot be loaded there" in done.stderr
+    assert "No module named 'not_there'" in done.stderr
+    assert _rows(tmp_path / "out") == 0
+
+
+def test_a_worker_with_two_threads_is_refused_before_anything_is_flown(
+    cluster: Cluster, file: Path, tmp_path: Path
+) -> None:
+    worker = _worker(tmp_path, Path(cluster.scheduler), "--nthreads", "2", "--no-nanny")
+    try:
+        _until(lambda: "Registered to:" in (tmp_path / "cluster.log").read_text())
+        done = command("run", file, "--out", tmp_path / "out", "--dask", cluster.scheduler)
+    finally:
+        worker.kill()
+        worker.wait()
+    assert done.returncode == 2
+    assert "has 2 threads, must have 1: start it with --nthreads 1" in done.stderr.splitlines()[-1]
+
+
+def test_a_worker_that_differs_is_told_with_what_to_install() -> None:
+    mine = versions()
+    other = {**mine, "numpy": "1.0", "Python": "2.7", "harness source": "0000"}
+    reports: dict[str, Report | BaseException] = {
+        "tcp://a:1": Report(mine, 1, ("a", 1)),
+        "tcp://b:1": Report(other, 1, ("b", 1)),
+        "tcp://c:1": ModuleNotFoundError("No module named 'harness'"),
+        "tcp://d:1": Report({**mine, "processor": "another"}, 1, ("d", 1)),
+        "tcp://d:2": Report(mine, 1, ("d", 1)),
+    }
+    b, c, d = _unfit(reports)
+    assert b.startswith("tcp://b:1: harness source 0000 there, ")
+    assert (
+        f"install there Python {mine['Python']}, the harness from this source, pip install numpy=={mine['numpy']}" in b
+    )
+    assert c == "tcp://c:1: No module named 'harness': install this standoff-harness there, with [dask]"
+    assert d == "tcp://d:2: is in one process with tcp://d:1, must have its own"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["somewhere"], "must be HOST:PORT"),
+        (["gone.json"], "gone.json: there is no such file"),
+        (["127.0.0.1:8786", "--workers", "2"], "leave one out"),
+    ],
+)
+def test_a_cluster_that_is_none_is_one_line(words: list[str], said: str, file: Path, tmp_path: Path) -> None:
+    done = invoke("run", file, "--out", tmp_path / "out", "--dask", *words, "--set", "seed=1")
+    assert done.exit_code != 0
+    assert said in done.output + str(done.exception)
+
+
+def test_without_the_package_a_line_says_what_to_install(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    done = invoke("run", file, "--out", tmp_path / "out", "--dask", "127.0.0.1:8786")
+    assert done.exit_code != 0
+    assert "pip install 'standoff-harness[dask]'" in done.output + str(done.exception)
