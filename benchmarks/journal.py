@@ -38,7 +38,8 @@ def kept(folder: Path, count: int) -> tuple[float, float, float]:
             result = result or result_of(simulate(flight), 0.01)
             one = identity(flight)
             store.place(of.identifier, combination.position, one.key)
-            orders.append(Order(one.key, combination.position, parcels.packed(flight), one.version.number, "none", False))
+            packed = parcels.packed(flight)
+            orders.append(Order(one.key, combination.position, packed, one.version.number, "none", False))
             own = result._replace(metrics=dict(result.metrics), final=dict(result.final))
             answers.append((WorkerResult(own, one.version.number), b""))
             if len(orders) == _CHUNK:
