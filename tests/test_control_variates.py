@@ -40,6 +40,15 @@ def test_the_interval_of_a_mean_holds_the_truth_also_where_only_the_narrower_one
     assert abs(means.mean()) < 3.5 * means.std() / math.sqrt(len(means))  # unbiased
 
 
+@pytest.mark.parametrize("scatter", ["normal", "skewed to the right", "log-normal"])
+def test_where_the_plants_go_together_poorly_it_is_told_seldom_and_is_a_little_too_narrow(scatter: str) -> None:
+    draws = np.random.default_rng(5)
+    found = [drawn(scatter, 0.5, 20, 200, draws) for _ in range(1000)]
+    told = [of.reduced for of in found if of.plain.width**2 >= LEAST_SAVED * of.reduced.width**2]
+    assert 0.04 <= len(told) / len(found) <= 0.13
+    assert 0.88 <= np.mean([of.low <= 0.0 <= of.high for of in told]) <= 0.93
+
+
 def test_it_saves_what_theory_says_of_the_correlation() -> None:
     draws = np.random.default_rng(6)
     saved = [
