@@ -15,7 +15,7 @@ from benchmarks.runs import matrix
 from harness.key import files, identity
 from harness.loop import simulate
 from harness.provenance import provenance
-from harness.runs.far import Order
+from harness.runs.far import FarFlight
 from harness.runs.parcels import Parcels
 from harness.runs.row import result_of, row
 from harness.runs.store import JOURNAL, Store
@@ -39,7 +39,7 @@ def kept(folder: Path, count: int) -> tuple[float, float, float]:
             one = identity(flight)
             store.place(of.identifier, combination.position, one.key)
             packed = parcels.packed(flight)
-            orders.append(Order(one.key, combination.position, packed, one.version.number, "none", False))
+            orders.append(FarFlight(one.key, combination.position, packed, one.version.number, "none", False))
             own = result._replace(metrics=dict(result.metrics), final=dict(result.final))
             answers.append((WorkerResult(own, one.version.number), b""))
             if len(orders) == _CHUNK:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from harness.error import HarnessError
-from harness.pool import SPAWN, THREADS
+from harness.spawn import SPAWN, THREADS
 
 SECONDS = 60.0  # on the clock
 MEMORY = 2 << 30  # bytes more than the process has when the function is called

@@ -17,14 +17,8 @@ from typing import Any, TypeVar
 from pebble import ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
-THREADS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
-SPAWN = multiprocessing.get_context("spawn")
+from harness.spawn import SPAWN, THREADS
+
 Result = TypeVar("Result")
 
 _AHEAD = 2  # jobs per worker that are sent out: one in work, one waiting; a full pipe would block

@@ -176,8 +176,11 @@ def loaded(folder: Path) -> tuple[jsbsim.FGFDMExec, list[str]]:
 
 
 @pytest.mark.parametrize("name", ["c172x", "c310", "Short_S23"])  # systems with entities, an override of their numbers
-def test_a_fenced_model_flies_as_the_model_does_and_is_one_file(name: str, tmp_path: Path) -> None:
+def test_a_fenced_model_flies_as_the_model_does_and_is_one_file(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """10 s with the throttle open; Short_S23 has 13 files and declares [0] and [1] of one property."""
+    monkeypatch.chdir(tmp_path)  # where the model as it is writes its <output>
     (copy := tmp_path / name).mkdir()
     fence.fence(LIBRARY / "aircraft" / name, copy, LIBRARY)
     assert [path.name for path in copy.iterdir()] == [f"{name}.xml"]

@@ -88,9 +88,10 @@ def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> Fdm:
 
     Errors of the aircraft are in a copy of its model: JSBSim lets nobody set mass or lags of a loaded one.
     """
+    is_foreign = aircraft.adopted(airframe) is not None
     if not errors.of_aircraft:
-        return _load(airframe, step)
-    if aircraft.adopted(airframe):
+        return _load(airframe, step, is_foreign)
+    if is_foreign:
         raise ModelError(f"{airframe.name} is an adopted model: errors of the aircraft are for the harness's own")
     with TemporaryDirectory(prefix="harness-") as folder:
         copy = Path(folder) / airframe.name
@@ -98,7 +99,7 @@ def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> Fdm:
         model = deepcopy(parsed(aircraft.model(airframe)))
         _alter(model, errors)
         ElementTree.ElementTree(model).write(aircraft.model(copy), encoding="utf-8")
-        return _load(copy, step)
+        return _load(copy, step, is_foreign)
 
 
 def _alter(model: ElementTree.Element, errors: Errors) -> None:
@@ -130,7 +131,8 @@ def _alter(model: ElementTree.Element, errors: Errors) -> None:
             element.text = late
 
 
-def _load(airframe: Path, step: float) -> Fdm:
+def _load(airframe: Path, step: float, is_foreign: bool) -> Fdm:
+    """A foreign model's warnings are its own, and its properties were seen to when it was adopted."""
     model = parsed(aircraft.model(airframe))
     _load_log.problems.clear()
     fdm = jsbsim.FGFDMExec(None)
@@ -141,7 +143,6 @@ def _load(airframe: Path, step: float) -> Fdm:
         )
     except RuntimeError as error:  # also what the C++ library throws besides JSBSim's own BaseError
         raise ModelError(f"{aircraft.model(airframe)}: {' '.join(str(error).split())}") from error
-    is_foreign = aircraft.adopted(airframe) is not None  # its warnings are its own, and its properties were seen to
     if not loaded or (_load_log.problems and not is_foreign):
         raise ModelError(f"{aircraft.model(airframe)}: {'; '.join(_load_log.problems) or 'not loaded'}")
     missing = [] if is_foreign else unknown(fdm, _properties(model))

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from harness.error import HarnessError
 from harness.files import make_folder, replacing
 from harness.plants.plant import Outcome
-from harness.runs.far import SOURCE, Answer, Brief, Order, Report, fly_chunk, report, unlike, versions
+from harness.runs.far import SOURCE, Answer, Brief, FarFlight, Report, fly_chunk, report, unlike, versions
 from harness.runs.parcels import Parcel, Parcels
 from harness.runs.recordings import recording_path
 from harness.runs.row import failed_result
@@ -181,7 +181,7 @@ class _Flying:
 
     def _submit(self, chunk: _Chunk) -> None:
         orders = [
-            Order(t.key, t.position, self.parcels.packed(t.flight), t.version, t.record, t.compiled)
+            FarFlight(t.key, t.position, self.parcels.packed(t.flight), t.version, t.record, t.compiled)
             for t in chunk.tasks
         ]
         message = zlib.compress(pickle.dumps(orders), 1)

@@ -30,7 +30,7 @@ SOURCE = "harness source"
 _PROCESSOR = "processor"
 
 
-class Order(NamedTuple):
+class FarFlight(NamedTuple):
     """A flight to be flown far away: a `Task` whose flight is packed."""
 
     key: str
@@ -102,7 +102,7 @@ def fly_chunk(message: bytes, parcels: Mapping[str, Parcel], brief: Brief) -> An
     folder = Path(worker.local_directory) / "standoff-harness"
     folder.mkdir(exist_ok=True)
     keep(parcels, folder)
-    orders: list[Order] = pickle.loads(zlib.decompress(message))
+    orders: list[FarFlight] = pickle.loads(zlib.decompress(message))
     needed = frozenset(number for order in orders for number in order.flight.parcels)
     if lacks := frozenset(number for number in needed if not (folder / number).exists()):
         return Answer(lacks=lacks)

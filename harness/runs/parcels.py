@@ -24,7 +24,7 @@ _SUFFIXES = (".toml", ".xml")  # of the files of an airframe
 _NO_LAW = law("nftsm")  # stands for a law that is not unpacked yet
 
 
-class Place(NamedTuple):
+class ParcelPlace(NamedTuple):
     """Where something lies: the number of a parcel, and a path in it."""
 
     parcel: str
@@ -38,7 +38,7 @@ class Place(NamedTuple):
 class FileLaw(NamedTuple):
     """A law of one's own from a file."""
 
-    at: Place
+    at: ParcelPlace
     class_name: str
     values: Mapping[str, Any]  # of its fields
 
@@ -48,8 +48,8 @@ class Packed(NamedTuple):
 
     flight: Flight  # without what follows, where that is given
     law: FileLaw | None
-    airframe: Place | None
-    track: Place | None
+    airframe: ParcelPlace | None
+    track: ParcelPlace | None
 
     @property
     def parcels(self) -> set[str]:
@@ -62,7 +62,7 @@ class Parcels:
     """The parcels of a run, each read once."""
 
     content: dict[str, Parcel] = field(default_factory=dict)  # by number
-    _known: dict[object, Place] = field(default_factory=dict)  # by what was asked for
+    _known: dict[object, ParcelPlace] = field(default_factory=dict)  # by what was asked for
 
     def packed(self, flight: Flight) -> Packed:
         """The flight, whose files are kept in `content`. Raises OSError when one is missing."""
@@ -83,7 +83,7 @@ class Parcels:
             flight = replace(flight, target=replace(flight.target, track=None))
         return Packed(flight, carried, airframe, at_track)
 
-    def _airframe(self, folder: Path) -> Place:
+    def _airframe(self, folder: Path) -> ParcelPlace:
         if aircraft.is_recorded(folder):
             return self._place(("aircraft", folder), {folder.name: folder}, folder.name)
         if ("aircraft", folder) in self._known:
@@ -91,12 +91,12 @@ class Parcels:
         files = [path for path in folder.iterdir() if path.suffix in _SUFFIXES and path.is_file()]
         return self._place(("aircraft", folder), {f"{folder.name}/{path.name}": path for path in files}, folder.name)
 
-    def _place(self, what: object, files: Mapping[str, Path], path: str) -> Place:
+    def _place(self, what: object, files: Mapping[str, Path], path: str) -> ParcelPlace:
         if what not in self._known:
             parcel = {name: read(path) for name, path in files.items()}
             number = hashed({name: content_hash(content) for name, content in parcel.items()})
             self.content[number] = parcel
-            self._known[what] = Place(number, path)
+            self._known[what] = ParcelPlace(number, path)
         return self._known[what]
 
 

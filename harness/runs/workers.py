@@ -25,12 +25,13 @@ from harness.error import HarnessError
 from harness.flight import Flight
 from harness.key import version_of
 from harness.plants.plant import Outcome
-from harness.pool import SPAWN, ended, living, started
+from harness.pool import ended, living, started
 from harness.runs.own_time import OwnTime
 from harness.runs.recordings import record, wanted
 from harness.runs.row import FlightResult, failed_result, result_of, simulate_safely
 from harness.runs.wall_time import CHUNK, WallTime
 from harness.settings.laws import LawError
+from harness.spawn import SPAWN
 
 AHEAD = 2  # chunks sent out per worker: one is flown, one waits
 TIMEOUT = 60.0  # s of a worker's own time in which a flight gains no simulated time

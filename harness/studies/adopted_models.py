@@ -89,7 +89,7 @@ def _table(headings: list[str], rows: list[list[str]]) -> Iterator[str]:
 @out_option
 @click.option("--workers", type=click.IntRange(1, 64), default=2, show_default=True, help="Models at a time.")
 def main(out: Path, workers: int) -> None:
-    """Adopt every model that comes with JSBSim, and write which fly and why the others do not."""
+    """Adopt every model that comes with JSBSim, and write OUT/adopted_models.md: which fly, and why others do not."""
     with ThreadPoolExecutor(workers) as pool:
         results = []
         for result in pool.map(tried, models()):

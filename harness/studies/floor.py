@@ -262,9 +262,10 @@ class _PlantedFlying:
         self._turn(half)
 
     def _turn(self, angle: float) -> None:
-        state = self._flying.state
+        flying, state = self._flying, self._flying.state
         v_a, psi = state.airspeed, state.heading + angle
-        self._flying.state = state._replace(
+        flying.moved = flying.moved._replace(heading=psi)
+        flying.state = state._replace(
             heading=psi, velocity_north=v_a * math.cos(psi), velocity_east=v_a * math.sin(psi)
         )
 
