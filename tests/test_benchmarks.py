@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from benchmarks import compiled, flight_speed, help_speed, maps, recording_speed, runs
+from benchmarks import compiled, flight_speed, help_speed, maps, planted_failures, planted_peers, recording_speed, runs
 from tests.builders import drawing
 
 
@@ -72,3 +72,15 @@ def test_compiled_flights_are_timed_beside_those_of_python(capsys: pytest.Captur
     assert all(medians(line) for line in plants)
     assert " times as fast" in matrix
     assert first.startswith("the first compiled flight of a process: ")
+
+
+def test_the_page_of_other_searches_tells_the_median_and_how_many_found_it() -> None:
+    results = [
+        (search, planted_failures.Cell("bowl", dimensions, share, [20.0, 30.0, 40.0]))
+        for search in planted_peers.SEARCHES
+        for dimensions in planted_peers.DIMENSIONS
+        for share in planted_failures.SHARES
+    ]
+    text = "\n".join(planted_peers.page(results))
+    assert text.count("| bowl | 4 | 30 (3) | 30 (3) | 30 (3) | 30 (3) |") == len(planted_failures.SHARES)
+    assert "- CMA-ES: 18 of 18 searches found it; the median took 30." in text
