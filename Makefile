@@ -69,6 +69,7 @@ adopt-all: install  ## adopt every model that comes with JSBSim: docs/answers/ad
 
 bench: install  ## the speed of the loop, as ratios in one run, of the laws, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed
+	$(BIN)/python -m benchmarks.performance
 	$(BIN)/python -m benchmarks.law_speed
 	$(BIN)/python -m benchmarks.help_speed
 	$(BIN)/python -m benchmarks.recording_speed

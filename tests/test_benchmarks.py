@@ -1,10 +1,21 @@
 """The benchmarks run: each on the least that it measures, with its numbers printed."""
 
 import re
+from pathlib import Path
 
 import pytest
 
-from benchmarks import compiled, flight_speed, help_speed, maps, planted_failures, planted_peers, recording_speed, runs
+from benchmarks import (
+    compiled,
+    flight_speed,
+    help_speed,
+    maps,
+    performance,
+    planted_failures,
+    planted_peers,
+    recording_speed,
+    runs,
+)
 from tests.builders import drawing
 
 
@@ -84,3 +95,16 @@ def test_the_page_of_other_searches_tells_the_median_and_how_many_found_it() -> 
     text = "\n".join(planted_peers.page(results))
     assert text.count("| bowl | 4 | 30 (3) | 30 (3) | 30 (3) | 30 (3) |") == len(planted_failures.SHARES)
     assert "- CMA-ES: 18 of 18 searches found it; the median took 30." in text
+
+
+def test_the_page_of_what_a_flight_costs_has_every_case_and_part(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    performance.main(pairs=1, duration=20, path=tmp_path / "performance.md")
+    text = (tmp_path / "performance.md").read_text(encoding="utf-8")
+    for case in performance.cases(20.0):
+        (ratio, _) = medians(next(line for line in text.splitlines() if line.startswith(f"| {case} |")))
+        assert ratio > 0.8
+    (step,) = re.findall(r"JSBSim, a step of 5 ms \| ([\d.]+) \|", text)
+    assert float(step) > 0.0
+    assert len(lines(capsys)) == len(performance.cases(20.0)) + 1

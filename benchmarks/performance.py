@@ -1,0 +1,128 @@
+"""What a 6-DOF flight costs beside bare JSBSim: `python -m benchmarks.performance [PAIRS [SECONDS]]`.
+
+Every case is flown beside a bare loop of as many steps of the same model with its inner loop, in turn, in processor
+time. Writes docs/performance.md.
+"""
+
+import os
+import platform
+import statistics
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import jsbsim
+import numpy as np
+
+import aircraft
+from autopilot.estimator import Estimator
+from autopilot.laws import law
+from benchmarks.flight_speed import bare_loop, seconds, spread
+from harness.files import write_text
+from harness.flight import Flight, air_of
+from harness.log import COLUMNS
+from harness.loop import simulate
+from harness.plants.sixdof import SixDof
+from harness.tables import markdown
+from harness.world.wind import Wind
+
+PAGE = Path("docs/performance.md")
+AIRFRAME = "ultra_stick_25e"
+
+
+class Timed(NamedTuple):
+    """The processor times of a flight and of the bare loop beside it, s."""
+
+    flown: list[float]
+    bare: list[float]
+
+    @property
+    def ratios(self) -> list[float]:
+        return [f / b for f, b in zip(self.flown, self.bare, strict=True)]
+
+    def over(self, other: "Timed | None" = None) -> float:
+        """How much longer the flight takes than bare JSBSim, or by how much more than another flight does, s."""
+        more = statistics.median(f - b for f, b in zip(self.flown, self.bare, strict=True))
+        return more - (other.over() if other else 0.0)
+
+
+def cases(duration: float) -> dict[str, tuple[Flight, str]]:
+    """The flights, and what is asked of each."""
+    plain = Flight(plant="sixdof", aircraft=AIRFRAME, law=law("nftsm", "paper_1"), duration=duration)
+    turbulent, filtered = Wind(turbulence="moderate"), Estimator(kind="ekf")
+    return {
+        "still air, target known, 20 Hz": (plain, "1.12"),
+        "moderate turbulence at every step": (replace(plain, wind=turbulent), ""),
+        "EKF at 2 Hz": (replace(plain, estimator=filtered), ""),
+        "moderate turbulence and EKF": (replace(plain, wind=turbulent, estimator=filtered), "1.2"),
+        "still air, target known, 50 Hz": (replace(plain, guidance_period=0.02), "1.35"),
+    }
+
+
+def timed(flight: Flight, pairs: int) -> Timed:
+    """The flight and the bare loop, in turn."""
+    found = Timed([], [])
+    for _ in range(pairs):
+        found.bare.append(bare_loop(flight))
+        found.flown.append(seconds(partial(simulate, flight)))
+    return found
+
+
+def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], starts: list[float]) -> Iterator[str]:
+    """The page, in Markdown."""
+    (plain, _), *_ = flights.values()
+    still, turbulent, filtered, _, quick = found.values()
+    steps = round(plain.duration / plain.step)
+    filterings = round(plain.duration / plain.estimator.period)
+    periods = plain.periods
+    more_periods = round(plain.duration / 0.02) - periods
+    yield "# What a flight costs"
+    yield "\n`make bench` measures it; `python -m benchmarks.performance` writes this page (a minute or two).\n"
+    yield (
+        f"Machine: {os.cpu_count()} processors, {platform.machine()}, Python {platform.python_version()}, "
+        f"NumPy {np.__version__}, JSBSim {jsbsim.__version__}."
+    )
+    yield (
+        f"A flight of `{AIRFRAME}` with `nftsm` for {plain.duration:g} s, in steps of {plain.step:g} s, that logs "
+        f"{len(COLUMNS)} channels at every guidance period."
+    )
+    yield "Beside it a bare loop that does nothing but `fdm.run()`, as often, on the same trimmed model in still air."
+    yield f"Processor time, in turn; medians and ranges of {len(still.flown)} pairs.\n"
+    rows = [
+        (name, asked, spread(each.ratios), spread(each.flown))
+        for (name, (_, asked)), each in zip(flights.items(), found.values(), strict=True)
+    ]
+    yield from markdown(("flight", "asked at most", "times the bare loop", "s"), rows, "lr")
+    yield f"\nBuilding, loading and trimming takes {spread(starts, 1e3)} ms; 2.5 ms are asked."
+    yield "[Compiled flights](guide/many_flights.md#compiled-flights) are those of the other plants.\n"
+    yield "## Where the time goes\n"
+    yield "From differences of the medians above:\n"
+    parts = (
+        (f"JSBSim, a step of {1e3 * plain.step:g} ms", statistics.median(still.bare) / steps),
+        ("observation, law, command and record, a guidance period", still.over() / periods),
+        ("the same, of the further periods at 50 Hz", quick.over(still) / more_periods),
+        ("turbulence, a step: made before the flight, and written to JSBSim", turbulent.over(still) / steps),
+        ("measurement and EKF, an update, with its share of the periods between", filtered.over(still) / filterings),
+    )
+    yield from markdown(("part", "µs"), [(name, f"{1e6 * value:.2f}") for name, value in parts], "lr")
+
+
+def main(pairs: int = 5, duration: float = 900.0, *, path: Path = PAGE) -> None:
+    """Measures, and writes the page."""
+    flights = cases(duration)
+    found = {}
+    for name, (flight, _) in flights.items():
+        found[name] = timed(flight, pairs)
+        print(f"{name}: {spread(found[name].ratios)} times the bare loop", flush=True)
+    (plain, _), *_ = flights.values()
+    plant = SixDof(aircraft.folder(AIRFRAME), plain.step, rate_trim=True)
+    starts = [seconds(partial(plant.start, plain.start, air_of(plain))) for _ in range(20)][1:]
+    write_text(path, "\n".join(page(flights, found, starts)) + "\n")
+    print(path)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))
