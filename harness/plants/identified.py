@@ -119,7 +119,7 @@ def model_digest(airframe: Path) -> str:
 
 def document(airframe: Path, known: list[Identified]) -> str:
     """The text of `identified.toml` with these identifications."""
-    command = f"harness identify {aircraft.argument(airframe)}"
+    command = f"harness identify {airframe.name}"  # no path of the machine in a file that travels
     lines = [
         f"# Written by `{command}`: what the plants lagged and coordinated fly by. SI, rad.",
         "",
