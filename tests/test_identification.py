@@ -145,7 +145,7 @@ def test_the_command_identifies_draws_keeps_and_says_how_long_is_left(
     assert result.exit_code == 0, result.output
     told = [line for line in result.stderr.splitlines() if line.startswith("identifying skywalker_x8: ")]
     assert len(told) == 34  # 32 flights and two fits
-    assert all(re.search(r": \d+ % done, \d+ s left$", line) for line in told)
+    assert all(re.search(r": \d+ % done, \d+ (s|min) left$", line) for line in told)
     assert "100 % done" in told[-1]
     for words in ("63 %", "bandwidth", "turn ratio", "delay", "damping", "lagged  coordinated"):
         assert words in result.output
