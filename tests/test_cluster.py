@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,9 +68,17 @@ name = "nftsm"
 seed = { start = 0, count = 160 }
 """
 
+IMPATIENT = """\
+from harness.cli.main import main
+from harness.runs import cluster
+cluster._CONNECTING = cluster._WITHOUT_WORKERS = 2.0
+main()
+"""
+
 
 class Cluster(NamedTuple):
     scheduler: str  # its file
+    process: int  # of the scheduler
     workers: list[int]  # the processes that start them again
 
 
@@ -95,20 +103,36 @@ def _worker(folder: Path, file: Path, *words: str) -> subprocess.Popen[bytes]:
     return _started(folder, "distributed.cli.dask_worker", *given)
 
 
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    folder = tmp_path_factory.mktemp("cluster")
+@contextmanager
+def _running(folder: Path, workers: int) -> Iterator[Cluster]:
     file = folder / "scheduler.json"
     processes = [_started(folder, "distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", str(file))]
-    processes += [_worker(folder, file, "--nthreads", "1") for _ in range(2)]
-    _until(lambda: (folder / "cluster.log").read_text().count("Registered to:") == 2)
-    yield Cluster(str(file), [process.pid for process in processes[1:]])
+    processes += [_worker(folder, file, "--nthreads", "1") for _ in range(workers)]
+    _until(lambda: (folder / "cluster.log").read_text().count("Registered to:") == workers)
+    nannies = [psutil.Process(process.pid) for process in processes[1:]]
+    below = [child for nanny in nannies for child in nanny.children(recursive=True)]
+    try:
+        yield Cluster(str(file), processes[0].pid, [nanny.pid for nanny in nannies])
+    finally:
+        _end(processes, below)
+
+
+def _end(processes: list[subprocess.Popen[bytes]], below: list[psutil.Process]) -> None:
     for process in reversed(processes):
         with suppress(psutil.NoSuchProcess):
             for child in psutil.Process(process.pid).children(recursive=True):
                 child.kill()
         process.kill()
         process.wait()
+    for child in below:  # of a nanny that a test killed
+        with suppress(psutil.NoSuchProcess):
+            child.kill()
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with _running(tmp_path_factory.mktemp("cluster"), workers=2) as running:
+        yield running
 
 
 @pytest.fixture
@@ -168,9 +192,57 @@ def test_a_flight_that_ends_every_worker_is_one_row(cluster: Cluster, file: Path
     sets = [word for axis in axes for word in ("--set", axis)]
     done = command("run", file, "--out", out, "--log", "none", "--dask", cluster.scheduler, *sets)
     assert done.returncode == 1, done.stderr
-    outcomes = harness.load_results(out).set_index("law.deadly")["outcome"]
-    assert outcomes[True] == "worker_died"
-    assert outcomes[False] == "completed"
+    results = harness.load_results(out).set_index("law.deadly")
+    assert results["outcome"][True] == "worker_died"
+    assert "the last one was tcp://127.0.0.1:" in results["reason"][True]
+    assert results["outcome"][False] == "completed"
+
+
+@pytest.mark.parametrize(
+    ("what", "said"), [("scheduler", "the scheduler is gone"), ("workers", "all workers are gone")]
+)
+def test_a_scheduler_or_all_workers_that_end_are_one_line_and_rows_are_kept(
+    what: str, said: str, tmp_path: Path
+) -> None:
+    file, out = write(tmp_path / "many.toml", MANY.replace("count = 160", "count = 2000")), tmp_path / "out"
+    with _running(tmp_path, workers=1) as mine:
+        words = words_of("run", file, "--out", out, "--engine", "python", "--log", "none", "--dask", mine.scheduler)
+        client = subprocess.Popen(
+            [sys.executable, "-c", IMPATIENT, *words[words.index("run") :]], stderr=subprocess.PIPE, text=True
+        )
+        _until(lambda: _rows(out) > 0)
+        if what == "scheduler":
+            psutil.Process(mine.process).kill()
+        else:
+            nanny = psutil.Process(mine.workers[0])
+            below = nanny.children(recursive=True)
+            for process in (nanny, *below):  # first the one that would start it again
+                with suppress(psutil.NoSuchProcess):
+                    process.kill()
+        _, told = client.communicate(timeout=30)
+    assert client.returncode == 2
+    assert f"{mine.scheduler}: {said}; what was flown is kept, and the same command resumes the run" in told
+    assert "distributed" not in told
+    assert 0 < _rows(out) < 2000
+
+
+def test_falsify_map_and_tune_fly_on_a_cluster_what_they_fly_at_home(cluster: Cluster, tmp_path: Path) -> None:
+    file = write(tmp_path / "one.toml", MANY.partition("[matrix]")[0].replace("100.0", "5.0"))
+    calls = {
+        "falsify": ["--over", "law.k2=1:9", "--requirement", "range_error_peak_m<5", "--flights", 6],
+        "map": ["--x", "law.k2=1:9", "--y", "start.heading_deg=0:90", "--resolution", 10, "--flights", 130],
+        "tune": ["--over", "law.k2=1:9", "--minimise", "range_error_peak_m", "--flights", 6],
+    }
+    for name, words in calls.items():
+        far, home = tmp_path / f"{name}_far", tmp_path / f"{name}_home"
+        done = [
+            invoke(name, file, "--out", out, *words, *how)
+            for out, how in ((far, ["--dask", cluster.scheduler]), (home, ["--workers", 0]))
+        ]
+        assert done[0].exit_code == done[1].exit_code, done[0].output
+        assert "2 workers at" in done[0].output
+        assert digests(far)
+        assert digests(far) == digests(home)
 
 
 def test_a_law_that_cannot_be_loaded_on_a_worker_is_told_and_no_row(
@@ -222,6 +294,7 @@ def test_a_worker_that_differs_is_told_with_what_to_install() -> None:
     ("words", "said"),
     [
         (["somewhere"], "must be HOST:PORT"),
+        (["tls://127.0.0.1:8786"], "TLS needs certificates: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE"),
         (["gone.json"], "gone.json: there is no such file"),
         (["127.0.0.1:8786", "--workers", "2"], "leave one out"),
     ],

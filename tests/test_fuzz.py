@@ -153,6 +153,7 @@ CALLS: Mapping[str, Sequence[str]] = {
         "MATRIX --out RUN --limit 8 --workers 0 --log none", "MATRIX --dry-run --limit WORD",
         "MATRIX --dry-run --shard WORD",
         "MATRIX --out OUT --engine WORD", f"MATRIX --out OUT {SHORT} --limit 2 --workers 0 --shard 2/3",
+        "MATRIX --out OUT --dask WORD", "FILE --out OUT --limit 1 --dask OUT/WORD.json",
     ],
     "falsify": [
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement WORD",

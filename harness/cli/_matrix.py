@@ -33,7 +33,7 @@ def cluster(scheduler: str | None) -> Iterator[Cluster | None]:
         yield None
         return
     with connected(scheduler) as many:
-        click.echo(f"{counted(many.workers, 'worker')} at {scheduler}")
+        click.echo(f"{counted(many.workers, 'worker')} at {scheduler}", err=True)
         yield many
 
 

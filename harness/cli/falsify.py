@@ -23,6 +23,7 @@ _MOST_LINES = 5  # of the table of the worst
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search, not of the flights.")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
+@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
@@ -38,6 +39,7 @@ def falsify(
     flights: int,
     seed: int,
     workers: int | None,
+    dask: str | None,
     overrides: tuple[str, ...],
     retry: str | None,
     engine: str | None,
@@ -68,7 +70,7 @@ def falsify(
           --requirement 'outcome = completed'
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import engine_of, flown_out, print_survey, processes, surveyed
+    from harness.cli._matrix import cluster, engine_of, flown_out, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
@@ -82,7 +84,7 @@ def falsify(
     from harness.search.space import Space
     from harness.settings import read_settings
 
-    workers = processes(workers, flight_timeout)
+    workers = processes(workers, flight_timeout, dask)
     try:
         required = requirement(asked)
     except RequirementError as error:
@@ -100,14 +102,16 @@ def falsify(
             click.echo(f"to be broken: {required}")
         trials = flights // len(space.conditions)
         typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
-        options = Options(
-            workers=workers,
-            retry_failed=retry is not None,
-            timeout=flight_timeout or TIMEOUT,
-            typical=typical,
-            compiled=engine_of(middle, engine, trials),
-        )
-        progress = flown_out(search.fly(out, options), out)
+        with cluster(dask) as many:
+            options = Options(
+                workers=many.workers if many else workers,
+                retry_failed=retry is not None,
+                timeout=flight_timeout or TIMEOUT,
+                typical=typical,
+                compiled=engine_of(middle, engine, trials),
+                cluster=many,
+            )
+            progress = flown_out(search.fly(out, options), out)
         with busy("writing the table of flights"):
             export(out)
             counterexample, table = write_counterexample(search, out), write_probes(search, out)

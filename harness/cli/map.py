@@ -32,6 +32,7 @@ _PICTURES = ("map.png", PICTURE)
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="The folder of the results.")
 @click.option("--flights", type=int, metavar="N", help="At most N flights.  [default: a tenth of the full grid's]")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
+@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
@@ -47,6 +48,7 @@ def map_(
     out: Path,
     flights: int | None,
     workers: int | None,
+    dask: str | None,
     overrides: tuple[str, ...],
     retry: str | None,
     engine: str | None,
@@ -74,7 +76,7 @@ def map_(
           --y start.heading_deg=0:360 --set plant=kinematic
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import engine_of, flown_out, print_endings, print_survey, processes, surveyed
+    from harness.cli._matrix import cluster, engine_of, flown_out, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.drawing import save
@@ -89,7 +91,7 @@ def map_(
     from harness.search.space import Space
     from harness.settings import read_settings
 
-    workers = processes(workers, flight_timeout)
+    workers = processes(workers, flight_timeout, dask)
     try:
         dimensions = [dimension(across, "--x"), dimension(upwards, "--y")]
         space = Space(read_settings(file, overrides), dimensions)
@@ -99,13 +101,15 @@ def map_(
         writable_folder(out)
         print_survey(space.matrix, middle, 0)
         _print_search(found)
-        options = Options(
-            workers=workers,
-            retry_failed=retry is not None,
-            timeout=flight_timeout or TIMEOUT,
-            compiled=engine_of(middle, engine, found.flights / middle.flights),
-        )
-        progress = flown_out(found.fly(out, options), out)
+        with cluster(dask) as many:
+            options = Options(
+                workers=many.workers if many else workers,
+                retry_failed=retry is not None,
+                timeout=flight_timeout or TIMEOUT,
+                compiled=engine_of(middle, engine, found.flights / middle.flights),
+                cluster=many,
+            )
+            progress = flown_out(found.fly(out, options), out)
         with busy("writing the table of flights"):
             export(out)
             found.write(out)

@@ -37,6 +37,7 @@ _MOST_LINES = 30  # of a front
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search, not of the flights.")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
+@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
 @click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
@@ -53,6 +54,7 @@ def tune(
     aggregate: str,
     seed: int,
     workers: int | None,
+    dask: str | None,
     overrides: tuple[str, ...],
     retry: str | None,
     engine: str | None,
@@ -80,7 +82,7 @@ def tune(
           --minimise range_error_peak_m --minimise convergence_time_s --subject-to 'range_error_peak_m < 5'
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import engine_of, flown_out, print_endings, print_survey, processes, surveyed
+    from harness.cli._matrix import cluster, engine_of, flown_out, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
@@ -93,7 +95,7 @@ def tune(
     from harness.search.tune import tuning
     from harness.settings import read_settings
 
-    workers = processes(workers, flight_timeout)
+    workers = processes(workers, flight_timeout, dask)
     try:
         space = Space(read_settings(file, overrides), [dimension(text) for text in over])
         asked = _requirements(required)
@@ -105,14 +107,18 @@ def tune(
         _print_search(search)
         trials = flights // len(space.conditions)
         typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
-        options = Options(
-            workers=workers,
-            retry_failed=retry is not None,
-            timeout=flight_timeout or TIMEOUT,
-            typical=typical,
-            compiled=engine_of(middle, engine, trials),
-        )
-        progress = flown_out(search.fly(out, options), out, "looking for settings that meet what is known beforehand")
+        with cluster(dask) as many:
+            options = Options(
+                workers=many.workers if many else workers,
+                retry_failed=retry is not None,
+                timeout=flight_timeout or TIMEOUT,
+                typical=typical,
+                compiled=engine_of(middle, engine, trials),
+                cluster=many,
+            )
+            progress = flown_out(
+                search.fly(out, options), out, "looking for settings that meet what is known beforehand"
+            )
         with busy("writing the table of flights"):
             export(out)
             best, table = write_best(search, out), write_trials(search, out)

@@ -55,15 +55,24 @@ def connected(where: str) -> Iterator["Cluster"]:
         raise ClusterError(
             "--dask needs the package distributed, here and on every worker: pip install 'standoff-harness[dask]'"
         ) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told in one line
+    for name in ("distributed", "distributed.client"):  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is told in one line
     if where.endswith(".json"):
         if not Path(where).is_file():
             raise ClusterError(f"{where}: there is no such file, as `dask scheduler --scheduler-file` writes")
         how: dict[str, str] = {"scheduler_file": where}
+        address = Path(where).read_text(errors="replace")
     elif _ADDRESS.fullmatch(where):
         how = {"address": where}
+        address = where
     else:
         raise ClusterError(f"--dask is {where!r}, must be HOST:PORT, tcp://HOST:PORT, tls://HOST:PORT or FILE.json")
+    if "tls://" in address and distributed.Security().get_connection_args("client")["ssl_context"] is None:
+        # a client that finds this out itself waits 20 s at the end, and shows a traceback
+        raise ClusterError(
+            f"{where}: TLS needs certificates: set DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..__CLIENT__CERT and "
+            "..__CLIENT__KEY to their files"
+        )
     try:
         client = distributed.Client(**how, timeout=_CONNECTING, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
@@ -166,13 +175,14 @@ class _Flying:
         """Sends chunks until every worker has enough; returns whether there is one that was or will be sent."""
         sent = False
         while len(self.out) < _AHEAD * max(1, self.cluster.workers):
-            if self.client.status != "running":
-                return bool(sent or self.again)
             chunk = self.again.popleft() if self.again else self._next_chunk()
             if chunk is None and self.suspects and not self.out:
                 chunk = self.suspects.popleft()
             if chunk is None:
                 break
+            if self.client.status != "running":  # it waits for the scheduler, and the run is not over
+                self.again.appendleft(chunk)
+                return True
             self._submit(chunk)
             sent = True
             if chunk.is_alone:
@@ -223,7 +233,8 @@ class _Flying:
             self.suspects.extend(_Chunk([task], chunk.parcels, is_alone=True) for task in chunk.tasks)
             return
         (task,) = chunk.tasks
-        reason = "the workers of the cluster that had it ended, one after the other"
+        last = getattr(getattr(error, "last_worker", None), "address", "unknown")
+        reason = f"the workers of the cluster that had it ended, one after the other; the last one was {last}"
         yield Done(task, WorkerResult(failed_result(Outcome.WORKER_DIED, reason), task.version))
 
     def _with_recording(self, task: Task, result: WorkerResult, recording: bytes) -> WorkerResult:
