@@ -44,7 +44,7 @@ def start_problems(flight: Flight) -> list[Problem]:
     if (model := model_of_another(flight)) is None:
         problem = _cannot_start(plant, start, wind)
     else:
-        problem = _cannot_start_apart(plant, start, wind, model, _changed(model))  # type: ignore[arg-type]  # a value
+        problem = _cannot_start_apart(plant, start, wind, model, _changed(model))
     return [Problem(*problem, (*_OF_PLANT, "start.altitude", "wind.steady"))] if problem else []
 
 

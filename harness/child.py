@@ -64,7 +64,8 @@ def limited(
         raise ChildError(stage, f"the process {how_ended(ended)}")
     returned, value = pickle.loads(message)
     if returned:
-        return value  # type: ignore[no-any-return]
+        result: Result = value
+        return result
     if isinstance(value, MemoryError):
         raise ChildError(stage, f"needs more memory than the {memory >> 20} MB that it may have")
     raise value

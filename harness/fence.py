@@ -228,7 +228,9 @@ def _parsed(file: Path, content: bytes, entities: bool) -> Tag:
             raise refused(f"elements stand more than {DEEPEST} deep in each other")
         if elements > MOST_ELEMENTS:
             raise refused(f"more than {MOST_ELEMENTS} elements")
-        builder.start(name, attributes).place = f"{file}:{parser.CurrentLineNumber}"  # type: ignore[attr-defined]
+        tag = builder.start(name, attributes)
+        assert isinstance(tag, Tag)  # as the builder's factory makes them
+        tag.place = f"{file}:{parser.CurrentLineNumber}"
 
     def end(name: str) -> None:
         nonlocal depth

@@ -154,19 +154,23 @@ def _rows(out: Path) -> int:
     return 0
 
 
+def _until_more_than(rows: int, out: Path) -> None:
+    _until(lambda: _rows(out) > rows)
+
+
 def test_client_and_worker_are_killed_and_the_rows_are_those_of_a_run_at_home(cluster: Cluster, tmp_path: Path) -> None:
     file, far, home = write(tmp_path / "many.toml", MANY), tmp_path / "far", tmp_path / "home"
     words = words_of("run", file, "--out", far, "--engine", "python", "--dask", cluster.scheduler)
     for ended_by, code in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)):
         before = _rows(far)
         client = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        _until(lambda before=before: _rows(far) > before)  # type: ignore[misc]
+        _until_more_than(before, far)
         client.send_signal(ended_by)
         assert client.wait(20) == code
     kept = _rows(far)
     assert 0 < kept < 160
     resumed = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
-    _until(lambda: _rows(far) > kept)
+    _until_more_than(kept, far)
     for process in psutil.Process(cluster.workers[0]).children(recursive=True):
         process.kill()
     said, _ = resumed.communicate(timeout=100)
@@ -210,7 +214,7 @@ def test_a_scheduler_or_all_workers_that_end_are_one_line_and_rows_are_kept(
         client = subprocess.Popen(
             [sys.executable, "-c", IMPATIENT, *words[words.index("run") :]], stderr=subprocess.PIPE, text=True
         )
-        _until(lambda: _rows(out) > 0)
+        _until_more_than(0, out)
         if what == "scheduler":
             psutil.Process(mine.process).kill()
         else:

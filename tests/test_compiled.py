@@ -3,7 +3,7 @@
 import math
 import random
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -221,10 +221,9 @@ def test_a_law_whose_file_has_changed_since_it_was_loaded_is_not_lifted(tmp_path
         module_of(step)
 
 
+@dataclass
 class Turner:
-    """A function that has no hash."""
-
-    __hash__ = None  # type: ignore[assignment]
+    """A function that has no hash, as every value that can change."""
 
     def __call__(self) -> float:
         return 0.01

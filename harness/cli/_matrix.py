@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,6 @@ from harness.cli._input import BadInput
 from harness.cli._progress import busy, duration, of_run
 
 if TYPE_CHECKING:
-    from harness.runs.cluster import Cluster
     from harness.runs.matrix import Matrix
     from harness.runs.run import Options, Progress
     from harness.runs.survey import Survey
@@ -25,16 +25,20 @@ _MOST_WARNINGS = 10
 
 
 @contextmanager
-def cluster(scheduler: str | None) -> Iterator[Cluster | None]:
-    """The Dask cluster of a scheduler, if one is named. Raises `ClusterError`."""
+def many_flights(workers: int, dask: str | None, retry: str | None, flight_timeout: float | None) -> Iterator[Options]:
+    """How flights are flown: in these processes, or on the Dask cluster of a scheduler. Raises `ClusterError`."""
+    from harness.runs.run import Options
+    from harness.runs.workers import TIMEOUT
+
+    options = Options(workers=workers, retry_failed=retry is not None, timeout=flight_timeout or TIMEOUT)
+    if dask is None:
+        yield options
+        return
     from harness.runs.cluster import connected
 
-    if scheduler is None:
-        yield None
-        return
-    with connected(scheduler) as many:
-        click.echo(f"{counted(many.workers, 'worker')} at {scheduler}", err=True)
-        yield many
+    with connected(dask) as cluster:
+        click.echo(f"{counted(cluster.workers, 'worker')} at {dask}", err=True)
+        yield replace(options, workers=cluster.workers, cluster=cluster)
 
 
 def processes(workers: int | None, flight_timeout: float | None, dask: str | None = None) -> int:

@@ -69,15 +69,15 @@ def falsify(
       harness falsify experiments/falsify.toml --out out/lost --over target.speed_mps=0:12 \\
           --requirement 'outcome = completed'
     """
+    from dataclasses import replace
+
     from harness.cli._input import BadInput
-    from harness.cli._matrix import cluster, engine_of, flown_out, print_survey, processes, surveyed
+    from harness.cli._matrix import engine_of, flown_out, many_flights, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
     from harness.requirement import RequirementError, requirement
     from harness.runs.results import export
-    from harness.runs.run import Options
-    from harness.runs.workers import TIMEOUT
     from harness.search.dimension import dimension
     from harness.search.falsify import falsification
     from harness.search.files import write_counterexample, write_probes
@@ -102,15 +102,8 @@ def falsify(
             click.echo(f"to be broken: {required}")
         trials = flights // len(space.conditions)
         typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
-        with cluster(dask) as many:
-            options = Options(
-                workers=many.workers if many else workers,
-                retry_failed=retry is not None,
-                timeout=flight_timeout or TIMEOUT,
-                typical=typical,
-                compiled=engine_of(middle, engine, trials),
-                cluster=many,
-            )
+        with many_flights(workers, dask, retry, flight_timeout) as options:
+            options = replace(options, typical=typical, compiled=engine_of(middle, engine, trials))
             progress = flown_out(search.fly(out, options), out)
         with busy("writing the table of flights"):
             export(out)

@@ -75,16 +75,16 @@ def map_(
       harness map experiments/stationary.toml --out out/basin --x start.position_m.east=-400:400 \\
           --y start.heading_deg=0:360 --set plant=kinematic
     """
+    from dataclasses import replace
+
     from harness.cli._input import BadInput
-    from harness.cli._matrix import cluster, engine_of, flown_out, print_endings, print_survey, processes, surveyed
+    from harness.cli._matrix import engine_of, flown_out, many_flights, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.drawing import save
     from harness.error import HarnessError
     from harness.files import replacing
     from harness.runs.results import export
-    from harness.runs.run import Options
-    from harness.runs.workers import TIMEOUT
     from harness.search.dimension import dimension
     from harness.search.map import map_of, question
     from harness.search.picture import drawn
@@ -101,14 +101,8 @@ def map_(
         writable_folder(out)
         print_survey(space.matrix, middle, 0)
         _print_search(found)
-        with cluster(dask) as many:
-            options = Options(
-                workers=many.workers if many else workers,
-                retry_failed=retry is not None,
-                timeout=flight_timeout or TIMEOUT,
-                compiled=engine_of(middle, engine, found.flights / middle.flights),
-                cluster=many,
-            )
+        with many_flights(workers, dask, retry, flight_timeout) as options:
+            options = replace(options, compiled=engine_of(middle, engine, found.flights / middle.flights))
             progress = flown_out(found.fly(out, options), out)
         with busy("writing the table of flights"):
             export(out)

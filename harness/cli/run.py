@@ -74,12 +74,11 @@ def run(
       harness run experiments/wind.toml --out out/wind --dask 127.0.0.1:8786
     """
     from harness.cli._input import BadInput
-    from harness.cli._matrix import cluster, engine_of, fly_matrix, print_survey, print_time, processes, surveyed
+    from harness.cli._matrix import engine_of, fly_matrix, many_flights, print_survey, print_time, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.error import HarnessError
     from harness.runs.matrix import read_matrix
-    from harness.runs.run import Options, positions_done
-    from harness.runs.workers import TIMEOUT
+    from harness.runs.run import positions_done
     from harness.settings import read_settings
 
     if out is None and not dry_run:
@@ -95,17 +94,8 @@ def run(
         if dry_run or out is None:
             print_time(size, len(done), max(1, workers), log)
             return
-        with cluster(dask) as many:
-            options = Options(
-                workers=many.workers if many else workers,
-                limit=limit,
-                log=log,
-                retry_failed=retry is not None,
-                timeout=flight_timeout or TIMEOUT,
-                typical=size.typical,
-                compiled=engine_of(size, engine),
-                cluster=many,
-            )
+        with many_flights(workers, dask, retry, flight_timeout) as options:
+            options = replace(options, limit=limit, log=log, typical=size.typical, compiled=engine_of(size, engine))
             progress = fly_matrix(matrix, out, options)
     except HarnessError as error:
         raise BadInput(str(error)) from None

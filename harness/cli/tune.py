@@ -81,14 +81,14 @@ def tune(
       harness tune experiments/tune.toml --out out/front --over law.k2=0.5:20 \\
           --minimise range_error_peak_m --minimise convergence_time_s --subject-to 'range_error_peak_m < 5'
     """
+    from dataclasses import replace
+
     from harness.cli._input import BadInput
-    from harness.cli._matrix import cluster, engine_of, flown_out, print_endings, print_survey, processes, surveyed
+    from harness.cli._matrix import engine_of, flown_out, many_flights, print_endings, print_survey, processes, surveyed
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
     from harness.runs.results import export
-    from harness.runs.run import Options
-    from harness.runs.workers import TIMEOUT
     from harness.search.dimension import dimension
     from harness.search.files import write_best, write_trials
     from harness.search.space import Space
@@ -107,15 +107,8 @@ def tune(
         _print_search(search)
         trials = flights // len(space.conditions)
         typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
-        with cluster(dask) as many:
-            options = Options(
-                workers=many.workers if many else workers,
-                retry_failed=retry is not None,
-                timeout=flight_timeout or TIMEOUT,
-                typical=typical,
-                compiled=engine_of(middle, engine, trials),
-                cluster=many,
-            )
+        with many_flights(workers, dask, retry, flight_timeout) as options:
+            options = replace(options, typical=typical, compiled=engine_of(middle, engine, trials))
             progress = flown_out(
                 search.fly(out, options), out, "looking for settings that meet what is known beforehand"
             )

@@ -168,23 +168,14 @@ def _square(x: float) -> tuple[float, float, float]:
 
 
 @jit
-def _hypot_of_three_parts(x: float, y: float) -> float:
-    """`math.hypot` of Python 3.11: the squares are added to 1 in three parts, and what is lost is kept."""
-    x, y = abs(x), abs(y)
-    most = larger(x, y)
-    if math.isinf(most):
-        return most
-    if math.isnan(x) or math.isnan(y):
-        return math.nan
-    if most == 0.0:
-        return 0.0
-    _, exponent = math.frexp(most)
-    if exponent < -1023:
-        raise ValueError("too small")
-    scale = math.ldexp(1.0, -exponent)
+def _root_of_three_parts(x: float, y: float) -> float:
+    """The root of the sum of squares, of numbers below 1, of which one is 0.5 or more, as Python 3.11 has it.
+
+    The squares are added to 1 in three parts, and what is lost is kept.
+    """
     total, lost_1, lost_2, lost_3 = 1.0, 0.0, 0.0, 0.0
     for value in (x, y):
-        first, second, third = _square(value * scale)
+        first, second, third = _square(value)
         before = total
         total += first
         lost_1 += (before - total) + first
@@ -203,7 +194,7 @@ def _hypot_of_three_parts(x: float, y: float) -> float:
     before = total
     total -= third
     lost_3 += (before - total) - third
-    return (h + (total - 1.0 + (lost_1 + lost_2 + lost_3)) / (2.0 * h)) / scale
+    return h + (total - 1.0 + (lost_1 + lost_2 + lost_3)) / (2.0 * h)
 
 
 @jit
@@ -220,8 +211,30 @@ def _product(x: float, y: float) -> tuple[float, float]:
 
 
 @jit
-def _hypot_of_two_parts(x: float, y: float) -> float:
-    """`math.hypot` since Python 3.12: the same with products of two parts."""
+def _root_of_two_parts(x: float, y: float) -> float:
+    """The same since Python 3.12: with products of two parts."""
+    total, lost_1, lost_2 = 1.0, 0.0, 0.0
+    for value in (x, y):
+        high, low = _product(value, value)
+        before = total
+        total += high
+        lost_1 += low
+        lost_2 += high - (total - before)
+    h = math.sqrt(total - 1.0 + (lost_1 + lost_2))
+    high, low = _product(-h, h)
+    before = total
+    total += high
+    lost_1 += low
+    lost_2 += high - (total - before)
+    return h + (total - 1.0 + (lost_1 + lost_2)) / (2.0 * h)
+
+
+_root = _root_of_two_parts if sys.version_info >= (3, 12) else _root_of_three_parts
+
+
+@jit
+def hypot(x: float, y: float) -> float:
+    """`math.hypot`."""
     x, y = abs(x), abs(y)
     most = larger(x, y)
     if math.isinf(most):
@@ -234,24 +247,7 @@ def _hypot_of_two_parts(x: float, y: float) -> float:
     if exponent < -1023:
         raise ValueError("too small")
     scale = math.ldexp(1.0, -exponent)
-    total, lost_1, lost_2 = 1.0, 0.0, 0.0
-    for value in (x, y):
-        high, low = _product(value * scale, value * scale)
-        before = total
-        total += high
-        lost_1 += low
-        lost_2 += high - (total - before)
-    h = math.sqrt(total - 1.0 + (lost_1 + lost_2))
-    high, low = _product(-h, h)
-    before = total
-    total += high
-    lost_1 += low
-    lost_2 += high - (total - before)
-    h += (total - 1.0 + (lost_1 + lost_2)) / (2.0 * h)
-    return h / scale
-
-
-hypot = _hypot_of_two_parts if sys.version_info >= (3, 12) else _hypot_of_three_parts
+    return _root(x * scale, y * scale) / scale
 
 
 @jit

@@ -51,7 +51,7 @@ class _LoadLog(jsbsim.FGLogger):
 
 _load_log = _LoadLog()
 jsbsim.set_logger(_load_log)
-jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call]  # as its stub has it
+jsbsim.FGJSBBase().debug_lvl = 0
 
 
 class ModelError(PlantError):

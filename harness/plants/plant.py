@@ -112,6 +112,8 @@ class Flying(Protocol):
 class Plant(Protocol):
     """A model of the aircraft with its inner loop: a frozen value, whose flights are started by `start`."""
 
+    def __hash__(self) -> int: ...
+
     def start(self, start: Start, air: Air) -> Flying:
         """The aircraft in flight, at `start` in this air. Raises `PlantError` when it cannot fly there."""
         ...

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,11 +45,11 @@ class Controls:
     throttles: tuple[str, ...]
 
     @classmethod
-    def of(cls, table: Mapping[str, object]) -> Self:
-        """From a table of a file: names, and for `throttle` a list of them."""
+    def of(cls, table: Mapping[str, Any]) -> Self:
+        """From a table of a file: names, and for `throttle` one or a list of them."""
         throttles = table["throttle"]
-        names = [throttles] if isinstance(throttles, str) else list(throttles)  # type: ignore[call-overload]
-        return cls(str(table["elevator"]), str(table["aileron"]), str(table["rudder"]), tuple(map(str, names)))
+        names = (throttles,) if isinstance(throttles, str) else tuple(throttles)
+        return cls(table["elevator"], table["aileron"], table["rudder"], names)
 
 
 class TrimPoint(NamedTuple):

@@ -6,9 +6,8 @@ know of each other. A part that the log cannot answer is refused with its reason
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,11 @@ from numpy.typing import NDArray
 from harness.margins import Assess
 from harness.plants.turn import GRAVITY
 from harness.recorded import response_fit, turn
-from harness.recorded import wind as air
+from harness.recorded.cannot_judge import CannotJudgeError
 from harness.recorded.recorded_flight import Basis, Channel, RecordedFlight
 from harness.recorded.response_fit import ResponseFit
-from harness.recorded.turn import TurnWindow
-from harness.recorded.wind import Estimated, Fit, GroundTrack
+from harness.recorded.turning import STOPPED, SteadyWind, Turning, TurnPoint, estimated_of, turning_of
+from harness.recorded.wind import Estimated
 from harness.verdict.judgement import words
 from harness.verdict.parts import PARTS, Bounds, Group, Part, margins_of
 from harness.verdict.statistics import LEAST_SEEDS, Evidence, Sample, evidence, seeds_to_decide
@@ -31,16 +30,12 @@ Array = NDArray[np.float64]
 CANNOT = "cannot be judged from this log"
 FLYING = 6.0  # m/s, over the ground or through the air: an aircraft at that speed flies
 SHORTEST = 10.0  # s of flight
-STOPPED = 1.0  # m/s: an airspeed sensor that shows less in flight shows nothing
-LEAST_TRACK = 20  # values of the ground velocity
-LEAST_IN_WINDOW = 6  # of them, in a window of turning flight
 WINDOW = 10.0  # s
 MOST_ALIKE = 0.4  # correlation of a window with the next: windows more alike than that are joined
 LEAST_LEAN = math.radians(2.0)  # rms of the bank about its mean, by which a lateral force is told from a zero offset
 LEAST_COMMAND = math.radians(1.0)  # rms of a command's change within a quarter of a second
 LEAST_EXPLAINED = 0.8  # of the bank, by its command
 SAMPLES_IN_LAG = 3.0  # values of the bank within the lag, or it cannot be told
-WIND_MOVED = 2.0  # m/s, from the beginning to the end of a flight
 
 _CIRCULAR = "no vane: an angle made of an estimated wind is circular, since that takes sideslip for zero"
 
@@ -49,10 +44,6 @@ LATERAL = Part(
 )
 LAG = Part("bank follows at once", "bank_lag_s", "s late", "turn_ratio", "at most", Group.FOLLOWED, assumed=0.0)
 GAIN = replace(PARTS["heading_rate_gain_slow"], title="bank as commanded", column="bank_gain")
-
-
-class Refusal(Exception):  # noqa: N818 - a reason, not an error
-    """A part cannot be judged; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,26 +59,6 @@ class PartFinding:
     windows: int = 0  # independent ones
     needed: int | None = None  # windows that would decide, were they like these
     bounds: Bounds = (None, None)  # of the value
-
-
-@dataclass(frozen=True, slots=True)
-class SteadyWind:
-    """The wind that the track tells, m/s, and what goes with it, each with its 95 % interval."""
-
-    north: tuple[float, float, float]  # value, low, high
-    east: tuple[float, float, float]
-    scale: tuple[float, float, float] | None  # true airspeed over the logged one; None where it cannot be told
-    source: str  # "track", or "autopilot"
-
-
-@dataclass(frozen=True, slots=True)
-class TurnPoint:
-    """A window of turning flight, rad/s: what g tan(bank)/V asks and what was flown."""
-
-    begin: float  # s
-    end: float
-    asked: float
-    flown: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,16 +88,16 @@ def assess(
     limits = margins_of(margins or Assess())
     try:
         begin, end = _flown(flight, begin, end)
-    except Refusal as refusal:
+    except CannotJudgeError as refusal:
         circular = "sideslip" in flight and flight["sideslip"].basis is not Basis.MEASURED
         reasons = [_CIRCULAR if part is _SIDESLIP and circular else str(refusal) for part in _PARTS]
         refused = tuple(PartFinding(part, CANNOT, reason) for part, reason in zip(_PARTS, reasons, strict=True))
         return Assessment(flight, begin, end, refused, None, None, (), math.nan, None, ())
     cut = flight.between(begin, end)
     notes: list[str] = []
-    turning, cut = _turning(cut, notes)
+    turning, cut = turning_of(cut, notes)
     response, cut = _response(cut, notes)
-    made: dict[str, _Made | Refusal] = {}
+    made: dict[str, _Made | CannotJudgeError] = {}
     makers: tuple[tuple[Part, Callable[[], _Made]], ...] = (
         (_LEVEL, lambda: _level(cut)),
         (_AIRSPEED, lambda: _airspeed(cut)),
@@ -138,15 +109,15 @@ def assess(
     for part, make in makers:
         try:
             made[part.column] = make()
-        except Refusal as refusal:
+        except CannotJudgeError as refusal:
             made[part.column] = refusal
     findings = [*_worded(made, limits), _lag(cut, response)]
     return Assessment(
         flight=cut, begin=begin, end=end, findings=tuple(findings),
-        wind=turning.wind if isinstance(turning, _Turning) else None,
-        estimated=turning.estimated if isinstance(turning, _Turning) else _estimated(cut),
-        points=turning.points if isinstance(turning, _Turning) else (),
-        age=turning.age if isinstance(turning, _Turning) else math.nan,
+        wind=turning.wind if isinstance(turning, Turning) else None,
+        estimated=turning.estimated if isinstance(turning, Turning) else estimated_of(cut),
+        points=turning.points if isinstance(turning, Turning) else (),
+        age=turning.age if isinstance(turning, Turning) else math.nan,
         response=response if isinstance(response, ResponseFit) else None, notes=tuple(notes),
     )  # fmt: skip
 
@@ -155,28 +126,31 @@ def assess(
 
 
 def _flown(flight: RecordedFlight, begin: float, end: float) -> tuple[float, float]:
-    """The part of the flight within these times in which the aircraft flies, before a failure. Raises `Refusal`."""
+    """The part of the flight within these times in which the aircraft flies, before a failure.
+
+    Raises `CannotJudgeError`.
+    """
     if flight.refusals:
-        raise Refusal(flight.refusals[0])
+        raise CannotJudgeError(flight.refusals[0])
     for name, channel in flight.channels.items():
         back = np.flatnonzero(np.diff(channel.time) < 0.0)
         if len(back):
-            raise Refusal(f"the clock of {name} goes back at {channel.time[back[0]]:.1f} s")
+            raise CannotJudgeError(f"the clock of {name} goes back at {channel.time[back[0]]:.1f} s")
     begin, end = max(begin, flight.begin), min(end, flight.end)
     if flight.failure:
         if flight.failure.time <= begin + SHORTEST:
-            raise Refusal(f"after a failure at {flight.failure.time:.1f} s ({flight.failure.text})")
+            raise CannotJudgeError(f"after a failure at {flight.failure.time:.1f} s ({flight.failure.text})")
         end = min(end, flight.failure.time)
     time, speed = _speed(flight.between(begin, end))
     fast = speed >= FLYING
     if not fast.any():
         most = float(speed.max()) if len(speed) else 0.0
-        raise Refusal(f"never airborne: the largest speed is {most:.1f} m/s")
+        raise CannotJudgeError(f"never airborne: the largest speed is {most:.1f} m/s")
     edges = np.diff(np.concatenate([[0], fast.astype(int), [0]]))
     runs = list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1, strict=True))
     first, last = max(runs, key=lambda run: float(time[run[1]] - time[run[0]]))
     if time[last] - time[first] < SHORTEST:
-        raise Refusal(f"airborne for {time[last] - time[first]:.1f} s at most; {SHORTEST:g} s are needed")
+        raise CannotJudgeError(f"airborne for {time[last] - time[first]:.1f} s at most; {SHORTEST:g} s are needed")
     return (
         begin if first == 0 else float(time[first]),
         end if last == len(time) - 1 else float(time[last]),
@@ -186,7 +160,7 @@ def _flown(flight: RecordedFlight, begin: float, end: float) -> tuple[float, flo
 def _speed(flight: RecordedFlight) -> tuple[Array, Array]:
     """How fast the aircraft moves, over the ground or through the air, whichever is more; at one time a second."""
     if not len(flight.channels):
-        raise Refusal("the log holds nothing in this time")
+        raise CannotJudgeError("the log holds nothing in this time")
     time = np.arange(flight.begin, flight.end, 0.5)
     speeds = []
     if flight.has("velocity_north", "velocity_east"):
@@ -195,163 +169,10 @@ def _speed(flight: RecordedFlight) -> tuple[Array, Array]:
         speeds.append(np.hypot(flight["velocity_forward"].at(time), flight["velocity_right"].at(time)))
     speeds += [np.abs(flight[name].at(time)) for name in ("ground_speed", "airspeed") if flight.has(name)]
     if not speeds:
-        raise Refusal("the log has neither a ground velocity nor an airspeed")
+        raise CannotJudgeError("the log has neither a ground velocity nor an airspeed")
     most = np.nanmax(np.vstack([np.full(len(time), -1.0), *speeds]), axis=0)
     known = most >= 0.0
     return time[known], most[known]
-
-
-# The turn
-
-
-@dataclass(frozen=True, slots=True)
-class _Turning:
-    """The turn relation and what it rests on."""
-
-    sample: Sample
-    barred: str  # why nothing may be decided by it
-    wind: SteadyWind | None
-    estimated: Estimated | None
-    points: tuple[TurnPoint, ...]
-    age: float
-
-
-def _turning(flight: RecordedFlight, notes: list[str]) -> tuple["_Turning | Refusal", RecordedFlight]:
-    """The turn relation; the flight with its bank the right way round. The notes gain what was found on the way."""
-    try:
-        found = _relation(flight, notes)
-        if found.sample.mean < 0.0:
-            flight = flight.changed(np.negative, *(n for n in ("bank", "bank_command") if n in flight))
-            notes.append("bank: the sign is the wrong way round in this log (left wing down is positive); turned")
-            found = _relation(flight, [])
-    except Refusal as refusal:
-        return refusal, flight
-    return found, flight
-
-
-def _relation(flight: RecordedFlight, notes: list[str]) -> _Turning:
-    if not flight.has("bank"):
-        raise Refusal("the log has no bank")
-    if not flight.has("velocity_north", "velocity_east"):
-        raise Refusal("the log has no velocity over the ground")
-    track = air.track_of(flight)
-    if len(track.time) < LEAST_TRACK:
-        raise Refusal(f"too few samples: {len(track.time)} values of the velocity over the ground")
-    measured = flight.has("airspeed") and flight["airspeed"].basis is Basis.MEASURED
-    known = track.airspeed[np.isfinite(track.airspeed)]
-    measured = measured and len(known) >= LEAST_TRACK and float(np.median(known)) > STOPPED
-    if not measured:
-        track = track._replace(airspeed=np.full(len(track.time), math.nan))
-    if not measured and not flight.has("wind_north", "wind_east"):
-        raise Refusal("no airspeed and no wind: the direction of the air velocity is not known")
-    estimate = air.estimated(flight, track)
-    fixed = _fixed_wind(track, estimate, measured=measured)
-    windows = turn.windows(flight["bank"])
-    windows = [window for window in windows if _sampled_in(track, window)]
-    steep = [window for window in windows if window.steepest > turn.STEEPEST]
-    windows = [window for window in windows if window.steepest <= turn.STEEPEST]
-    if len(windows) < LEAST_SEEDS:
-        beyond = f", {len(steep)} more with a bank beyond {math.degrees(turn.STEEPEST):.0f} deg" if steep else ""
-        raise Refusal(f"{len(windows)} independent turn windows{beyond}; {LEAST_SEEDS} are needed")
-    if fixed is None:
-        _has_settled(track)
-    turning = _jackknifed(flight["bank"], track, windows, fixed)
-    _say(notes, turning, estimate, steep)
-    return replace(turning, estimated=estimate)
-
-
-def _sampled_in(track: GroundTrack, window: TurnWindow) -> bool:
-    first, last = np.searchsorted(track.time, (window.begin, window.end))
-    return bool(last - first >= LEAST_IN_WINDOW)
-
-
-def _fixed_wind(track: GroundTrack, estimate: Estimated | None, *, measured: bool) -> Fit | None:
-    """The autopilot's wind where the track tells none; None where the track does. Raises `Refusal`."""
-    if measured and track.span >= air.LEAST_SPAN:
-        return None
-    span = f"the flight covers {math.degrees(track.span):.0f} deg of the compass"
-    if estimate is None:
-        raise Refusal(f"wind not known: {span}, {math.degrees(air.LEAST_SPAN):.0f} are needed, and the log has no wind")
-    if estimate.settled > 0.5 * (track.time[0] + track.time[-1]):
-        raise Refusal(f"wind not settled: the autopilot's estimate moves until {estimate.settled:.0f} s, and {span}")
-    return Fit(estimate.north, estimate.east, 1.0)
-
-
-def _has_settled(track: GroundTrack) -> None:
-    """Raises `Refusal` where the wind is another one at the end of the flight than at its beginning."""
-    moved, error = air.change(track)
-    if moved > max(WIND_MOVED, 4.0 * error):
-        raise Refusal(f"wind not settled: by the track it changes by {moved:.1f} m/s from beginning to end")
-
-
-def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fixed: Fit | None) -> _Turning:
-    """The relation with all that it rests on, and the same without each window and the flight around it."""
-    right = sum(window.is_right for window in windows)
-    bank_error = min(right, len(windows) - right) >= 2
-    of = turn.integrals(bank, bank.time[0], bank.time[-1])
-    whole = fixed or air.fitted(track)
-    age = turn.age_of(track, of, whole, windows, bank_error=bank_error)
-    edges = [-math.inf, *(0.5 * (a.end + b.begin) for a, b in pairwise(windows)), math.inf]
-    block = np.searchsorted(edges, track.time, side="right") - 1
-
-    def numbers(wind: Fit, at: Sequence[TurnWindow]) -> list[float]:
-        slope = turn.relation(track, of, wind, at, age, bank_error=bank_error)[0].slope
-        return [slope, *wind]
-
-    n = len(windows)
-    value = np.array(numbers(whole, windows))
-    without = [
-        numbers(fixed or air.fitted(track, block != k), [w for i, w in enumerate(windows) if i != k]) for k in range(n)
-    ]
-    pseudo = n * value - (n - 1) * np.array(without)
-    samples = [Sample(column, n, drawn=True) for column in pseudo.T]
-    with_interval = [(float(v), *(s.interval() or (float(v),) * 2)) for v, s in zip(value, samples, strict=True)]
-    _, north, east, scale = with_interval
-    wind = SteadyWind(north, east, None if fixed else scale, "autopilot" if fixed else "track")
-    barred = "" if fixed is None else "the wind is the autopilot's, whose error the interval does not hold"
-    points = tuple(_point(track, of, whole, window) for window in windows)
-    return _Turning(samples[0], barred, wind, None, points, age)
-
-
-def _point(track: GroundTrack, of: turn.Integrals, wind: Fit, window: TurnWindow) -> TurnPoint:
-    """Mean turn rates of a window."""
-    north, east = track.north - wind.north, track.east - wind.east
-    at = np.array([window.begin, window.end])
-    angle = np.interp(at, track.time, np.unwrap(np.arctan2(east, north)))
-    inside = (of.time >= window.begin) & (of.time <= window.end)
-    speed = np.interp(of.time[inside], track.time, np.hypot(north, east))
-    asked = float(np.mean(GRAVITY * of.tangent[inside] / speed))
-    return TurnPoint(window.begin, window.end, asked, float(angle[1] - angle[0]) / (window.end - window.begin))
-
-
-def _say(notes: list[str], turning: _Turning, estimate: Estimated | None, steep: Sequence[TurnWindow]) -> None:
-    wind = turning.wind
-    if wind and wind.scale and not wind.scale[1] <= 1.0 <= wind.scale[2]:
-        v, low, high = wind.scale
-        notes.append(
-            f"airspeed: the track needs {v:.3f} [{low:.3f}, {high:.3f}] times the logged airspeed; with the logged one "
-            f"the turn relation would read {turning.sample.mean / v:.3f}"
-        )
-    if estimate and estimate.is_reversed:
-        notes.append(
-            "wind: the autopilot's points to where the wind comes from; turned round it fits the airspeed to "
-            f"{estimate.misfit:.1f} m/s rms, else to {estimate.other_misfit:.1f}"
-        )
-    if estimate and wind and wind.source == "track":
-        apart = math.hypot(estimate.north - wind.north[0], estimate.east - wind.east[0])
-        notes.append(
-            f"wind: the autopilot's estimate, settled from {estimate.settled:.0f} s on, is {apart:.1f} m/s off the "
-            "track's"
-        )
-    if steep:
-        beyond = math.degrees(turn.STEEPEST)
-        notes.append(f"turn: {len(steep)} windows with a bank beyond {beyond:.0f} deg are left out")
-
-
-def _estimated(flight: RecordedFlight) -> Estimated | None:
-    if not flight.has("velocity_north", "velocity_east"):
-        return None
-    return air.estimated(flight, air.track_of(flight))
 
 
 # The parts
@@ -366,8 +187,8 @@ class _Made:
     barred: str = ""  # why nothing may be decided by it
 
 
-def _turn_relation(turning: "_Turning | Refusal") -> _Made:
-    if isinstance(turning, Refusal):
+def _turn_relation(turning: "Turning | CannotJudgeError") -> _Made:
+    if isinstance(turning, CannotJudgeError):
         raise turning
     return _Made(turning.sample, barred=turning.barred)
 
@@ -382,43 +203,43 @@ def _level(flight: RecordedFlight) -> _Made:
         off = channel.values - (flight["altitude_command"].at(channel.time) if commanded else np.median(channel.values))
         about = "from the commanded altitude" if commanded else "from the flight's median: the log has no command"
     else:
-        raise Refusal("the log has no altitude")
+        raise CannotJudgeError("the log has no altitude")
     return _Made(_windowed(channel.time, np.abs(off), np.max), about)
 
 
 def _airspeed(flight: RecordedFlight) -> _Made:
     if not flight.has("airspeed") or flight["airspeed"].basis is not Basis.MEASURED:
-        raise Refusal("the log has no measured airspeed")
+        raise CannotJudgeError("the log has no measured airspeed")
     channel = flight["airspeed"]
     usual = float(np.median(channel.values))  # not the command: the sensor's scale is no deviation
     if usual <= STOPPED:
-        raise Refusal(f"the airspeed sensor shows {usual:.1f} m/s in flight")
+        raise CannotJudgeError(f"the airspeed sensor shows {usual:.1f} m/s in flight")
     time, values = averaged(channel, 1.0)
     return _Made(_windowed(time, np.abs(values / usual - 1.0), _rms), "from the flight's median")
 
 
 def _sideslip(flight: RecordedFlight) -> _Made:
     if "sideslip" not in flight:
-        raise Refusal("no vane: the log has no sideslip")
+        raise CannotJudgeError("no vane: the log has no sideslip")
     channel = flight["sideslip"]
     if channel.basis is not Basis.MEASURED:
-        raise Refusal(_CIRCULAR)
+        raise CannotJudgeError(_CIRCULAR)
     return _Made(_windowed(channel.time, np.degrees(np.abs(channel.values)), _rms))
 
 
 def _lateral(flight: RecordedFlight) -> _Made:
     """The slope of the lateral specific force on g sin(bank): the turn relation less one, from another sensor."""
     if not flight.has("lateral_acceleration", "bank"):
-        raise Refusal("the log has no lateral specific force" if "bank" in flight else "the log has no bank")
+        raise CannotJudgeError("the log has no lateral specific force" if "bank" in flight else "the log has no bank")
     time, force = averaged(flight["lateral_acceleration"], 1.0)
     bank = flight["bank"].at(time)
     known = np.isfinite(bank) & np.isfinite(force) & (np.abs(bank) <= turn.STEEPEST)
     time, force, lean = time[known], force[known], GRAVITY * np.sin(bank[known])
     if len(time) < 4 or np.std(lean) < GRAVITY * LEAST_LEAN:
-        raise Refusal("the bank hardly changes, so that a force is not told from the sensor's zero")
+        raise CannotJudgeError("the bank hardly changes, so that a force is not told from the sensor's zero")
     count = int((time[-1] - time[0]) / WINDOW)
     if count < LEAST_SEEDS:
-        raise Refusal(f"{count} windows of {WINDOW:g} s; {LEAST_SEEDS} are needed")
+        raise CannotJudgeError(f"{count} windows of {WINDOW:g} s; {LEAST_SEEDS} are needed")
     block = np.minimum((count * (time - time[0]) / (time[-1] - time[0])).astype(int), count - 1)
 
     def slope(used: NDArray[np.bool_]) -> float:
@@ -430,13 +251,13 @@ def _lateral(flight: RecordedFlight) -> _Made:
     return _Made(Sample(np.array(pseudo), count, drawn=True), f"{_rms(turned):.2f} m/s2 rms")
 
 
-def _gain(response: "ResponseFit | Refusal") -> _Made:
-    if isinstance(response, Refusal):
+def _gain(response: "ResponseFit | CannotJudgeError") -> _Made:
+    if isinstance(response, CannotJudgeError):
         raise response
     return _Made(response.sample(response_fit.GAIN))
 
 
-def _response(flight: RecordedFlight, notes: list[str]) -> tuple["ResponseFit | Refusal", RecordedFlight]:
+def _response(flight: RecordedFlight, notes: list[str]) -> tuple["ResponseFit | CannotJudgeError", RecordedFlight]:
     """The fitted response of the bank; the flight with its command the right way round."""
     try:
         found = _fitted(flight)
@@ -444,30 +265,32 @@ def _response(flight: RecordedFlight, notes: list[str]) -> tuple["ResponseFit | 
             flight = flight.changed(np.negative, "bank_command")
             notes.append("bank command: the sign is the wrong way round beside the bank's; turned")
             found = _fitted(flight)
-    except Refusal as refusal:
+    except CannotJudgeError as refusal:
         return refusal, flight
     return found, flight
 
 
 def _fitted(flight: RecordedFlight) -> ResponseFit:
     if not flight.has("bank_command", "bank"):
-        raise Refusal("the log has no bank command" if "bank" in flight else "the log has no bank")
+        raise CannotJudgeError("the log has no bank command" if "bank" in flight else "the log has no bank")
     if float(np.std(flight["bank_command"].values)) < LEAST_COMMAND:
-        raise Refusal("not excited: the bank command hardly changes")
+        raise CannotJudgeError("not excited: the bank command hardly changes")
     fit = response_fit.fitted(flight["bank_command"], flight["bank"])
     if fit is None:
-        raise Refusal("too few samples: half a minute of bank and bank command is needed")
+        raise CannotJudgeError("too few samples: half a minute of bank and bank command is needed")
     if fit.excited < LEAST_COMMAND:
         changes = math.degrees(fit.excited)
-        raise Refusal(f"not excited: the bank command changes by {changes:.2g} deg rms within a quarter of a second")
+        raise CannotJudgeError(
+            f"not excited: the bank command changes by {changes:.2g} deg rms within a quarter of a second"
+        )
     if abs(fit.explained) < LEAST_EXPLAINED:
-        raise Refusal(f"the command explains {100 * max(0.0, fit.explained):.0f} % of the bank's variation")
+        raise CannotJudgeError(f"the command explains {100 * max(0.0, fit.explained):.0f} % of the bank's variation")
     return fit
 
 
-def _lag(flight: RecordedFlight, response: "ResponseFit | Refusal") -> PartFinding:
+def _lag(flight: RecordedFlight, response: "ResponseFit | CannotJudgeError") -> PartFinding:
     """The lag: an upper bound where the telemetry's age is in it, or where samples are too few."""
-    if isinstance(response, Refusal):
+    if isinstance(response, CannotJudgeError):
         return PartFinding(LAG, CANNOT, str(response))
     low, high = response.lag_interval()
     count = len(response.pseudo)
@@ -484,19 +307,19 @@ def _lag(flight: RecordedFlight, response: "ResponseFit | Refusal") -> PartFindi
     return PartFinding(LAG, Verdict.FAILS, "", response.lag, low, high, count)
 
 
-def _worded(made: "dict[str, _Made | Refusal]", limits: dict[str, float]) -> Iterator[PartFinding]:
+def _worded(made: "dict[str, _Made | CannotJudgeError]", limits: dict[str, float]) -> Iterator[PartFinding]:
     """The findings, judged as one family."""
     tests: dict[str, Evidence] = {}
     for column, each in made.items():
         if isinstance(each, _Made):
             if each.sample.seeds < LEAST_SEEDS:
-                made[column] = Refusal(f"{each.sample.seeds} independent windows; {LEAST_SEEDS} are needed")
+                made[column] = CannotJudgeError(f"{each.sample.seeds} independent windows; {LEAST_SEEDS} are needed")
             else:
                 tests[column] = evidence(each.sample, *_bounds(_BY_COLUMN[column], limits))
     family = dict(zip(tests, words(list(tests.values()), limits["significance"]), strict=True))
     for column, each in made.items():
         part = _BY_COLUMN[column]
-        if isinstance(each, Refusal):
+        if isinstance(each, CannotJudgeError):
             yield PartFinding(part, CANNOT, str(each))
             continue
         sample, bounds, word = each.sample, _bounds(part, limits), family[column]
@@ -522,14 +345,14 @@ def _bounds(part: Part, limits: dict[str, float]) -> Bounds:
 
 
 def _windowed(time: Array, values: Array, of: Callable[[Array], float]) -> Sample:
-    """A number for each window of flight; windows are as long as makes neighbours differ. Raises `Refusal`."""
+    """A number for each window of flight; windows are as long as makes neighbours differ. Raises `CannotJudgeError`."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     length = WINDOW
     while True:
         count = int((time[-1] - time[0]) / length) if len(time) else 0
         if count < LEAST_SEEDS:
-            raise Refusal(f"{count} independent windows of {length:g} s; {LEAST_SEEDS} are needed")
+            raise CannotJudgeError(f"{count} independent windows of {length:g} s; {LEAST_SEEDS} are needed")
         window = np.minimum((count * (time - time[0]) / (time[-1] - time[0])).astype(int), count - 1)
         numbers = np.array([of(values[window == k]) for k in range(count) if (window == k).any()])
         off = numbers - numbers.mean()

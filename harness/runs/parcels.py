@@ -8,7 +8,7 @@ same key.
 import os
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from autopilot.laws import law
 from harness.files import content_hash, read
 from harness.flight import Flight
 from harness.key import hashed
-from harness.settings.laws import FILES, kind_of, source_of
+from harness.settings.laws import FILES, kind_of, parameters, source_of
 
 Parcel = Mapping[str, bytes]  # the content of files, by their path below the folder of the parcel
 _SUFFIXES = (".toml", ".xml")  # of the files of an airframe
@@ -71,8 +71,7 @@ class Parcels:
         if own and not own.is_module:
             names = {label.removeprefix(FILES): path for label, path in own.files.items()}
             at = self._place(("law", own.name, *own.hashes.values()), names, own.main.name)
-            values = {each.name: getattr(flight.law, each.name) for each in fields(flight.law) if each.init}  # type: ignore[arg-type]
-            carried, flight = FileLaw(at, own.class_name, values), replace(flight, law=_NO_LAW)
+            carried, flight = FileLaw(at, own.class_name, parameters(flight.law)), replace(flight, law=_NO_LAW)
         if flight.aircraft not in aircraft.names():
             airframe = self._airframe(aircraft.folder(flight.aircraft))
             flight = replace(flight, aircraft="")

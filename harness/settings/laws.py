@@ -323,10 +323,14 @@ def _own(name: str) -> OwnLaw:
     return _LOADED[key]
 
 
+def parameters(law: Any) -> dict[str, Any]:
+    """The fields with which the law's class makes the same law."""
+    return {field.name: getattr(law, field.name) for field in fields(law) if field.init}
+
+
 def _reduced(law: Any) -> tuple[Any, ...]:
     """How a law of one's own goes to a worker: by its name, since a file is no module there."""
-    values = {field.name: getattr(law, field.name) for field in fields(law) if field.init}
-    return _restored, (_BY_CLASS[type(law)].source.name, values)
+    return _restored, (_BY_CLASS[type(law)].source.name, parameters(law))
 
 
 def _restored(name: str, values: Mapping[str, Any]) -> Law:

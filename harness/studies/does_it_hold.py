@@ -18,7 +18,7 @@ from harness.files import replacing, write_text
 from harness.margins import Assess
 from harness.runs.comparable import comparable
 from harness.studies.command import out_option, run, write
-from harness.studies.which_law import KEEPS
+from harness.studies.which_law import KEEPS, keepers_table
 from harness.template import template
 from harness.verdict.answer import interval, plain, signed, unit_of
 from harness.verdict.comparison import Comparison, Scorecard, compare_flights
@@ -348,19 +348,19 @@ def page(
     return texts[0] + "\n", texts[1].strip() + "\n"
 
 
-def keepers(places: str) -> dict[str, dict[str, list[str]]]:
-    """By airframe and condition the laws that keep the paper's promise, from the text of which_law.csv."""
-    found: dict[str, dict[str, list[str]]] = {}
+def keepers(places: str) -> dict[tuple[str, str], list[str]]:
+    """By condition and airframe the laws that keep the paper's promise, from the text of which_law.csv."""
+    found: dict[tuple[str, str], list[str]] = {}
     for row in csv.DictReader(io.StringIO(places)):
         if row[KEEPS]:
-            laws = found.setdefault(row["airframe"], {}).setdefault(row["condition"], [])
+            laws = found.setdefault((row["condition"], row["airframe"]), [])
             laws += [row["law"]] if row[KEEPS] == "yes" else []
     return found
 
 
 def last_line(places: str) -> str:
     """With which law and gains the promise is kept on each airframe, in which air."""
-    return template("harness.studies", "keepers.md.jinja").render(keepers=keepers(places)).strip()
+    return template("harness.studies", "keepers.md.jinja").render(kept=list(keepers_table(keepers(places)))).strip()
 
 
 def in_readme(readme: str, block: str) -> str:

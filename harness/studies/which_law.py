@@ -19,6 +19,7 @@ from harness.margins import Assess
 from harness.runs.comparable import comparable
 from harness.studies.command import out_option, run, write
 from harness.studies.floor import FloorAt, between, read_floor
+from harness.tables import markdown
 from harness.template import template
 from harness.verdict.pairs import entered, spread
 from harness.verdict.ranking import Ranking, Relation, Reordered, Standing, Tie, rankings
@@ -181,8 +182,19 @@ def kept(table: "pd.DataFrame") -> dict[tuple[str, str], list[str]]:
     return laws
 
 
+def keepers_table(keepers: Mapping[tuple[str, str], Sequence[str]]) -> Iterator[str]:
+    """The table, in Markdown, of `kept`: on which airframes each law keeps the promise in each condition."""
+    conditions = list(dict.fromkeys(condition for condition, _ in keepers))
+    airframes = list(dict.fromkeys(airframe for _, airframe in keepers))
+    rows = []
+    for law, _ in Counter(law for laws in keepers.values() for law in laws).most_common():
+        on = [[each for each in airframes if law in keepers.get((condition, each), ())] for condition in conditions]
+        rows.append([law, *("all" if each == airframes else ", ".join(each) or "none" for each in on)])
+    return markdown(["law", *conditions], rows)
+
+
 def reversals(each: Sequence[Compared]) -> Iterator[str]:
-    """A sentence for each law that falls behind others that it is better than on the reference."""
+    """A list, in Markdown, for each law that falls behind others that it is better than on the reference."""
     for of in each:
         here, there = of.error.orders[REFERENCE].places, of.error.orders[AIRCRAFT].places
         behind: dict[str, list[str]] = {}
@@ -190,11 +202,11 @@ def reversals(each: Sequence[Compared]) -> Iterator[str]:
             law, other = (change.law, change.other) if change.there is Relation.WORSE else (change.other, change.law)
             behind.setdefault(law, []).append(other)
         for law, others in behind.items():
-            ahead = "; ".join(f"{other}, {_shown(here[other])} → {_shown(there[other])} m" for other in others)
             yield (
-                f"{of.condition}, {of.aircraft} (n = {there[law].seeds}): {law}, {_shown(here[law])} → "
-                f"{_shown(there[law])} m, falls behind {ahead}."
+                f"- {of.condition}, {of.aircraft} (n = {there[law].seeds}): {law}, {_shown(here[law])} → "
+                f"{_shown(there[law])} m, falls behind"
             )
+            yield from (f"  - {other}, {_shown(here[other])} → {_shown(there[other])} m" for other in others)
 
 
 def _shown(place: Standing) -> str:
@@ -301,7 +313,7 @@ def page(table: "pd.DataFrame", each: Sequence[Compared], above: Sequence[Above]
         "overstated": (min(overstated), max(overstated)) if overstated else None,
         "beaten_by": beaten_by,
         "papers": PAPERS,
-        "kept": keeping,
+        "kept": list(keepers_table(keeping)),
         "keepers": Counter(law for laws in keeping.values() for law in laws).most_common(2),
         "most_beaten": [max((count[0] for count in counts), default=0) for counts in zip(*beaten, strict=True)]
         + [max((on_aircraft[1] for _, on_aircraft in beaten), default=0)],

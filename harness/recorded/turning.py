@@ -1,0 +1,201 @@
+"""The turn relation of a recorded flight, with wind and airspeed scale, which are fitted together with it.
+
+A window of turning flight is one draw: all is fitted anew with each window left out (the jackknife), so that the
+intervals know of each other.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from harness.plants.turn import GRAVITY
+from harness.recorded import turn
+from harness.recorded import wind as air
+from harness.recorded.cannot_judge import CannotJudgeError
+from harness.recorded.recorded_flight import Basis, Channel, RecordedFlight
+from harness.recorded.turn import TurnWindow
+from harness.recorded.wind import Estimated, Fit, GroundTrack
+from harness.verdict.statistics import LEAST_SEEDS, Sample
+
+STOPPED = 1.0  # m/s: an airspeed sensor that shows less in flight shows nothing
+LEAST_TRACK = 20  # values of the ground velocity
+LEAST_IN_WINDOW = 6  # of them, in a window of turning flight
+WIND_MOVED = 2.0  # m/s, from the beginning to the end of a flight
+
+
+@dataclass(frozen=True, slots=True)
+class SteadyWind:
+    """The wind that the track tells, m/s, and what goes with it, each with its 95 % interval."""
+
+    north: tuple[float, float, float]  # value, low, high
+    east: tuple[float, float, float]
+    scale: tuple[float, float, float] | None  # true airspeed over the logged one; None where it cannot be told
+    source: str  # "track", or "autopilot"
+
+
+@dataclass(frozen=True, slots=True)
+class TurnPoint:
+    """A window of turning flight, rad/s: what g tan(bank)/V asks and what was flown."""
+
+    begin: float  # s
+    end: float
+    asked: float
+    flown: float
+
+
+@dataclass(frozen=True, slots=True)
+class Turning:
+    """The turn relation and what it rests on."""
+
+    sample: Sample
+    barred: str  # why nothing may be decided by it
+    wind: SteadyWind | None
+    estimated: Estimated | None
+    points: tuple[TurnPoint, ...]
+    age: float
+
+
+def turning_of(flight: RecordedFlight, notes: list[str]) -> tuple[Turning | CannotJudgeError, RecordedFlight]:
+    """The turn relation; the flight with its bank the right way round. The notes gain what was found on the way."""
+    try:
+        found = _relation(flight, notes)
+        if found.sample.mean < 0.0:
+            flight = flight.changed(np.negative, *(n for n in ("bank", "bank_command") if n in flight))
+            notes.append("bank: the sign is the wrong way round in this log (left wing down is positive); turned")
+            found = _relation(flight, [])
+    except CannotJudgeError as refusal:
+        return refusal, flight
+    return found, flight
+
+
+def _relation(flight: RecordedFlight, notes: list[str]) -> Turning:
+    if not flight.has("bank"):
+        raise CannotJudgeError("the log has no bank")
+    if not flight.has("velocity_north", "velocity_east"):
+        raise CannotJudgeError("the log has no velocity over the ground")
+    track = air.track_of(flight)
+    if len(track.time) < LEAST_TRACK:
+        raise CannotJudgeError(f"too few samples: {len(track.time)} values of the velocity over the ground")
+    measured = flight.has("airspeed") and flight["airspeed"].basis is Basis.MEASURED
+    known = track.airspeed[np.isfinite(track.airspeed)]
+    measured = measured and len(known) >= LEAST_TRACK and float(np.median(known)) > STOPPED
+    if not measured:
+        track = track._replace(airspeed=np.full(len(track.time), math.nan))
+    if not measured and not flight.has("wind_north", "wind_east"):
+        raise CannotJudgeError("no airspeed and no wind: the direction of the air velocity is not known")
+    estimate = air.estimated(flight, track)
+    fixed = _fixed_wind(track, estimate, measured=measured)
+    windows = turn.windows(flight["bank"])
+    windows = [window for window in windows if _sampled_in(track, window)]
+    steep = [window for window in windows if window.steepest > turn.STEEPEST]
+    windows = [window for window in windows if window.steepest <= turn.STEEPEST]
+    if len(windows) < LEAST_SEEDS:
+        beyond = f", {len(steep)} more with a bank beyond {math.degrees(turn.STEEPEST):.0f} deg" if steep else ""
+        raise CannotJudgeError(f"{len(windows)} independent turn windows{beyond}; {LEAST_SEEDS} are needed")
+    if fixed is None:
+        _has_settled(track)
+    turning = _jackknifed(flight["bank"], track, windows, fixed)
+    _say(notes, turning, estimate, steep)
+    return replace(turning, estimated=estimate)
+
+
+def _sampled_in(track: GroundTrack, window: TurnWindow) -> bool:
+    first, last = np.searchsorted(track.time, (window.begin, window.end))
+    return bool(last - first >= LEAST_IN_WINDOW)
+
+
+def _fixed_wind(track: GroundTrack, estimate: Estimated | None, *, measured: bool) -> Fit | None:
+    """The autopilot's wind where the track tells none; None where the track does. Raises `CannotJudgeError`."""
+    if measured and track.span >= air.LEAST_SPAN:
+        return None
+    span = f"the flight covers {math.degrees(track.span):.0f} deg of the compass"
+    if estimate is None:
+        raise CannotJudgeError(
+            f"wind not known: {span}, {math.degrees(air.LEAST_SPAN):.0f} are needed, and the log has no wind"
+        )
+    if estimate.settled > 0.5 * (track.time[0] + track.time[-1]):
+        raise CannotJudgeError(
+            f"wind not settled: the autopilot's estimate moves until {estimate.settled:.0f} s, and {span}"
+        )
+    return Fit(estimate.north, estimate.east, 1.0)
+
+
+def _has_settled(track: GroundTrack) -> None:
+    """Raises `CannotJudgeError` where the wind is another one at the end of the flight than at its beginning."""
+    moved, error = air.change(track)
+    if moved > max(WIND_MOVED, 4.0 * error):
+        raise CannotJudgeError(f"wind not settled: by the track it changes by {moved:.1f} m/s from beginning to end")
+
+
+def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fixed: Fit | None) -> Turning:
+    """The relation with all that it rests on, and the same without each window and the flight around it."""
+    right = sum(window.is_right for window in windows)
+    bank_error = min(right, len(windows) - right) >= 2
+    of = turn.integrals(bank, bank.time[0], bank.time[-1])
+    whole = fixed or air.fitted(track)
+    age = turn.age_of(track, of, whole, windows, bank_error=bank_error)
+    edges = [-math.inf, *(0.5 * (a.end + b.begin) for a, b in pairwise(windows)), math.inf]
+    block = np.searchsorted(edges, track.time, side="right") - 1
+
+    def numbers(wind: Fit, at: Sequence[TurnWindow]) -> list[float]:
+        slope = turn.relation(track, of, wind, at, age, bank_error=bank_error)[0].slope
+        return [slope, *wind]
+
+    n = len(windows)
+    value = np.array(numbers(whole, windows))
+    without = [
+        numbers(fixed or air.fitted(track, block != k), [w for i, w in enumerate(windows) if i != k]) for k in range(n)
+    ]
+    pseudo = n * value - (n - 1) * np.array(without)
+    samples = [Sample(column, n, drawn=True) for column in pseudo.T]
+    with_interval = [(float(v), *(s.interval() or (float(v),) * 2)) for v, s in zip(value, samples, strict=True)]
+    _, north, east, scale = with_interval
+    wind = SteadyWind(north, east, None if fixed else scale, "autopilot" if fixed else "track")
+    barred = "" if fixed is None else "the wind is the autopilot's, whose error the interval does not hold"
+    points = tuple(_point(track, of, whole, window) for window in windows)
+    return Turning(samples[0], barred, wind, None, points, age)
+
+
+def _point(track: GroundTrack, of: turn.Integrals, wind: Fit, window: TurnWindow) -> TurnPoint:
+    """Mean turn rates of a window."""
+    north, east = track.north - wind.north, track.east - wind.east
+    at = np.array([window.begin, window.end])
+    angle = np.interp(at, track.time, np.unwrap(np.arctan2(east, north)))
+    inside = (of.time >= window.begin) & (of.time <= window.end)
+    speed = np.interp(of.time[inside], track.time, np.hypot(north, east))
+    asked = float(np.mean(GRAVITY * of.tangent[inside] / speed))
+    return TurnPoint(window.begin, window.end, asked, float(angle[1] - angle[0]) / (window.end - window.begin))
+
+
+def _say(notes: list[str], turning: Turning, estimate: Estimated | None, steep: Sequence[TurnWindow]) -> None:
+    wind = turning.wind
+    if wind and wind.scale and not wind.scale[1] <= 1.0 <= wind.scale[2]:
+        v, low, high = wind.scale
+        notes.append(
+            f"airspeed: the track needs {v:.3f} [{low:.3f}, {high:.3f}] times the logged airspeed; with the logged one "
+            f"the turn relation would read {turning.sample.mean / v:.3f}"
+        )
+    if estimate and estimate.is_reversed:
+        notes.append(
+            "wind: the autopilot's points to where the wind comes from; turned round it fits the airspeed to "
+            f"{estimate.misfit:.1f} m/s rms, else to {estimate.other_misfit:.1f}"
+        )
+    if estimate and wind and wind.source == "track":
+        apart = math.hypot(estimate.north - wind.north[0], estimate.east - wind.east[0])
+        notes.append(
+            f"wind: the autopilot's estimate, settled from {estimate.settled:.0f} s on, is {apart:.1f} m/s off the "
+            "track's"
+        )
+    if steep:
+        beyond = math.degrees(turn.STEEPEST)
+        notes.append(f"turn: {len(steep)} windows with a bank beyond {beyond:.0f} deg are left out")
+
+
+def estimated_of(flight: RecordedFlight) -> Estimated | None:
+    """The autopilot's estimate of the wind, where the log has one beside a track."""
+    if not flight.has("velocity_north", "velocity_east"):
+        return None
+    return air.estimated(flight, air.track_of(flight))
