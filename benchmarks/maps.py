@@ -45,7 +45,6 @@ def tongues(half: float) -> Planted:
     return lambda u, v: v < 0.1 or any(abs(u - c) < half * (0.9 - v) / 0.8 for c in (0.17, 0.39, 0.61, 0.83))
 
 
-ISLANDS = ((0.2, 0.3), (0.613, 0.377), (0.7, 0.8))
 PLANTED: dict[str, Planted] = {
     "a straight line": lambda u, v: v > 0.31 + 0.2 * u,
     "a wave": lambda u, v: v > 0.5 + 0.3 * math.sin(5.0 * u),

@@ -56,6 +56,21 @@ def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tup
     assert list(aircraft.data(folder)["adopted"]["sources"]) == ["c172p.xml", "eng_io320.xml", "prop_75in2f.xml"]
 
 
+def test_an_identified_adopted_aircraft_is_flown_on_the_plants_between_and_predicted(
+    adopted: tuple[str, Path], tmp_path: Path
+) -> None:
+    folder = shutil.copytree(adopted[1], tmp_path / "c172p")
+    said = invoke("identify", folder, "--keep", "--out", tmp_path / "plots")
+    assert said.exit_code == 0, said.output
+    for plant in ("lagged", "coordinated"):
+        flown = invoke("fly", folder / "circle.toml", "--set", f"plant={plant}", "--json")
+        assert flown.exit_code == 0, flown.output
+        assert json.loads(flown.stdout)["metrics"]["convergence_time_s"] > 0.0
+    predicted = invoke("predict", folder / "circle.toml")
+    assert predicted.exit_code == 0, predicted.output
+    assert "margin" in predicted.output
+
+
 @pytest.mark.parametrize(
     ("model", "stage", "cause"),
     [

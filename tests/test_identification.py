@@ -70,6 +70,18 @@ def test_a_fit_recovers_the_response_that_made_the_records() -> None:
     assert astuple(found) == pytest.approx(astuple(KNOWN), rel=1e-3)
 
 
+def test_a_fit_recovers_the_response_of_a_slow_aircraft_at_its_pace() -> None:
+    pace = 0.1
+    slow = replace(
+        KNOWN, delay=KNOWN.delay / pace, frequency=KNOWN.frequency * pace, lead=KNOWN.lead / pace,
+        sideslip_frequency=KNOWN.sideslip_frequency * pace, zero_frequency=KNOWN.zero_frequency * pace,
+        tail_rate=KNOWN.tail_rate * pace,
+    )  # fmt: skip
+    commands = [np.repeat(TRAINING["step of 5 deg/s"], 5), TRAINING["sweep of 2 deg/s rms"]]
+    found = fit([of_heading_rate(record_of(slow, command)) for command in commands], pace)
+    assert astuple(found) == pytest.approx(astuple(slow), rel=1e-3)
+
+
 def test_a_fit_recovers_the_airspeed_hold() -> None:
     hold = AirspeedHold(gain=-0.7, frequency=0.6, damping=0.8)
     excess = np.repeat([0.0, 0.3, 0.0], 2000)

@@ -72,10 +72,9 @@ def test_a_law_of_half_the_gain_has_twice_the_margin() -> None:
 
 def test_the_papers_nftsm_has_no_margin_and_its_smc_has_plenty() -> None:
     nftsm, smc = following(flight()), following(flight("smc", "paper"))
-    assert nftsm.is_enough is False
+    assert known(nftsm)[0] < 1.0
     assert nftsm.cycle is not None
     assert nftsm.cycle.frequency == pytest.approx(0.68, abs=0.02)
-    assert smc.is_enough
     assert smc.cycle is None
     assert known(smc)[0] > 20.0 > ENOUGH
     assert known(smc)[2] < 0.2 < 3.0 < known(nftsm)[2]
@@ -98,7 +97,7 @@ def test_the_heading_rate_is_followed_in_full_at_low_frequency(name: str) -> Non
 def test_where_nothing_is_known_it_says_why() -> None:
     unknown = following(flight(airspeed=17.0))
     assert "ultra_stick_25e is identified at 13 m/s" in unknown.reason
-    assert (unknown.margin, unknown.chatters, unknown.is_enough) == (None, None, None)
+    assert (unknown.margin, unknown.chatters) == (None, None)
     assert "cannot be held" in following(flight(max_heading_rate=0.05)).reason
 
 

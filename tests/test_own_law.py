@@ -15,7 +15,7 @@ import pytest
 import harness
 from harness.files import content_hash
 from harness.key import files, flight_key
-from harness.limit_cycle.margin import margin_of
+from harness.limit_cycle.margin import following
 from harness.log.signals import at_limit
 from harness.plants.plant import Outcome
 from harness.runs.store import content
@@ -358,7 +358,7 @@ def test_a_law_that_circles_the_other_way_has_the_same_prediction(tmp_path: Path
     for name, text in (("one.py", clockwise), ("other.py", turned)):
         write(tmp_path / name, text.replace('open("was_run", "a").close()', ""))
         law = harness.law(f"{tmp_path / name}:Field", k=8.0)
-        margins.append(margin_of(harness.Flight(plant="lagged", law=law)))
+        margins.append(following(harness.Flight(plant="lagged", law=law)).margin)
     assert margins[0] == pytest.approx(margins[1])
     assert margins[0] is not None
 

@@ -17,7 +17,7 @@ from autopilot.rules import RuleError
 from harness.cli.main import harness as cli
 from harness.error import ArgumentError, SettingsError
 from harness.flight import Flight
-from harness.limit_cycle.margin import margin_of
+from harness.limit_cycle.margin import following
 from harness.loop import simulate
 from harness.plants.plant import Start
 from harness.runs.description import flown
@@ -81,7 +81,7 @@ def test_behind_the_inner_loop_the_margin_to_the_limit_cycle_is_two(airframe: st
     own: Any = flight.law
     assert own.k3 == 0.5 * own.k2
     doubled = replace(own, k2=2.0 * own.k2, k3=2.0 * own.k3)
-    assert margin_of(replace(flight, law=doubled)) == pytest.approx(1.0, abs=0.02)
+    assert following(replace(flight, law=doubled)).margin == pytest.approx(1.0, abs=0.02)
     assert f"by the rule behind_inner_loop, k2 = {own.k2:g}, k3 = {own.k3:g}" in flown(document(flight))
 
 

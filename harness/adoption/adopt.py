@@ -277,7 +277,7 @@ def _turn(a: Adoption) -> Found:
     t = turned(a.folder, a.start, STEP, a.wish.max_bank, lag)
     if faults := t.faults(a.start.airspeed):
         raise RefusalError("90 deg", "; ".join(faults))
-    return a, (
+    return replace(a, flown={"turn": t}), (
         f"course within {math.degrees(t.error):.2f} deg, overshoot {math.degrees(t.overshoot):.1f} deg, course rate "
         f"{t.rate:.3f} of the command, altitude {t.altitude:.1f} m, sideslip {math.degrees(t.sideslip):.1f} deg"
     )
@@ -289,7 +289,7 @@ def _circle(a: Adoption) -> Found:
     if faults := c.faults(a.start.airspeed):
         raise RefusalError("circle", f"radius {a.law['standoff_m']:g} m: {'; '.join(faults)}")
     w = circled(a.folder, a.start, STEP, a.law, 0.3 * a.start.airspeed)
-    return a, (
+    return replace(a, flown={**a.flown, "circle": c, "circle_in_wind": w}), (
         f"radius {a.law['standoff_m']:g} m, error {100 * c.error:.2f} % rms over the last lap, altitude "
         f"{c.altitude:.1f} m, sideslip {math.degrees(c.sideslip):.1f} deg; in wind of 0.3 V {100 * w.error:.2f} %"
     )

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 import aircraft
 from harness.adoption.design import LoopDesign
 from harness.adoption.linear import Linear, eigenvalues_of, oscillation
+from harness.adoption.manoeuvres import Circled, Turned
 from harness.adoption.model import Original, with_inner_loop
 from harness.files import write_text
 from harness.plants.plant import Start
@@ -56,6 +57,7 @@ class Adoption:
     gains: LoopDesign | None = None
     engine: str = ""
     law: Mapping[str, float] | None = None  # standoff, limit and gains of the paper's law that suit the aircraft
+    flown: Mapping[str, Turned | Circled] = field(default_factory=dict)  # by what was flown
 
 
 def write(adoption: Adoption, model: Original) -> None:
@@ -109,6 +111,11 @@ def _airframe(a: Adoption, model: Original) -> Iterator[str]:
     yield from (f"aileron = {quoted(a.controls.aileron)}", f"rudder = {quoted(a.controls.rudder)}")
     yield f"throttle = {quoted(list(a.controls.throttles))}"
     yield from ("", "[adopted.trim]", *(f"{k} = {x:.6g}" for k, x in a.setting._asdict().items()))
+    if a.gains:
+        loop = {"bandwidth": a.gains.bandwidth, "damping": a.gains.damping}
+        yield from ("", "[adopted.loop]", *(f"{k} = {x:.4g}" for k, x in loop.items()))
+    for name, flight in a.flown.items():
+        yield from ("", f"[adopted.flown.{name}]", *(f"{k} = {x:.4g}" for k, x in asdict(flight).items()))
     if a.linear:
         yield from ("", "[adopted.motion]", *(f"{k} = {_finite(x)}" for k, x in motion(a.linear).items()))
         yield from ("", "[adopted.derivatives] # of u', v', w', p', q', r'", *_derivatives(a.linear))

@@ -48,11 +48,6 @@ class Following:
         """Whether a limit cycle is predicted; None when unknown."""
         return None if self.reason else self.cycle is not None
 
-    @property
-    def is_enough(self) -> bool | None:
-        """Whether the margin is `ENOUGH`; None when unknown."""
-        return None if self.margin is None else self.margin >= ENOUGH
-
 
 def following(flight: Flight, *, cycle: bool = True) -> Following:
     """What is predicted of the flight's law behind its airframe's inner loop, whatever plant the flight names.
@@ -91,11 +86,6 @@ def _following(loop: Loop, sweep: Sweep | None, with_cycle: bool) -> Following:
         margin=_known(margin),
         cycle=cycle() if with_cycle and margin <= _CALM else None,
     )
-
-
-def margin_of(flight: Flight) -> float | None:
-    """The margin alone; None when unknown."""
-    return following(flight, cycle=False).margin
 
 
 @lru_cache(maxsize=4096)

@@ -17,7 +17,6 @@ from harness.recorded.recorded_flight import Array, Basis, LogError, LoggedEvent
 MAGIC = b"\xa3\x95"  # before every message; the type follows
 _FMT = 128  # the type of the message that describes another
 _FMT_LENGTH = 89
-_EARTH = 6_371_000.0  # m, radius
 
 # Each letter of a format: NumPy's type, and the factor by which its whole numbers are multiplied.
 _LETTERS: Mapping[str, tuple[str, float]] = MappingProxyType(

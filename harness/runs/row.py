@@ -11,7 +11,7 @@ from harness.checks import model_of_another
 from harness.compiled import engine
 from harness.feasibility import feasibility_margin
 from harness.flight import Flight
-from harness.key import Identity, identity
+from harness.key import Identity
 from harness.log import COLUMNS, FlightLog
 from harness.log.metric import METRICS, measure
 from harness.loop import Watch, simulate
@@ -32,11 +32,6 @@ class FlightResult(NamedTuple):
     metrics: dict[str, float | bool | None]
     final: dict[str, float]  # the last row of the log: see `final`
     seconds: float | None  # wall time of the simulation, s
-
-
-def row_of(log: FlightLog) -> FlightRow:
-    """The row of a flown flight; None for a metric that has no value."""
-    return row(log.flight, identity(log.flight), result_of(log))
 
 
 def row(flight: Flight, identity: Identity, result: FlightResult) -> FlightRow:

@@ -1,22 +1,31 @@
 """The models that come with JSBSim, adopted one by one: which fly, and why the others do not."""
 
+import math
 import tempfile
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import click
 
+import aircraft
+from harness import tables
 from harness.adoption.adopt import adopt
 from harness.adoption.adoption import Wish
 from harness.adoption.refusal import RefusalError
-from harness.files import write_text
+from harness.files import read, write_text
 from harness.markup import markdown
 from harness.plants.model import data_root
 from harness.studies.command import out_option, run
 
 _PAGE = "adopted_models.md"
+_HEADINGS = (
+    "model", "airspeed, m/s", "throttle", "bank loop, rad/s", "damping", "overshoot, deg", "rate in turn",
+    "altitude, m", "sideslip, deg", "radius, m", "circle, %", "in wind, %",
+)  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -26,6 +35,21 @@ class Tried:
     name: str
     found: dict[str, str] = field(default_factory=dict)
     refused: str = ""
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # the table [adopted] of its data, once it has flown
+    airspeed: float = math.nan  # m/s
+    standoff: float = math.nan  # m
+
+    def cells(self) -> list[str]:
+        """Its line in the table of those that fly."""
+        flown, loop = self.numbers["flown"], self.numbers["loop"]
+        turn, circle, windy = flown["turn"], flown["circle"], flown["circle_in_wind"]
+        sideslip = max(turn["sideslip"], circle["sideslip"])
+        return [
+            self.name, f"{self.airspeed:.1f}", f"{self.numbers['trim']['throttle']:.2f}", f"{loop['bandwidth']:.2g}",
+            f"{loop['damping']:.2f}", f"{math.degrees(turn['overshoot']):.1f}", f"{turn['rate']:.3f}",
+            f"{turn['altitude']:.1f}", f"{math.degrees(sideslip):.1f}", f"{self.standoff:g}",
+            f"{100 * circle['error']:.2f}", f"{100 * windy['error']:.2f}",
+        ]  # fmt: skip
 
 
 def models() -> list[str]:
@@ -41,6 +65,10 @@ def tried(name: str) -> Tried:
         try:
             for stage, found in adopt(name, Path(folder), Wish()):
                 result.found[stage] = found
+            made = Path(folder) / name
+            result.airspeed = aircraft.data(made)["envelope"]["V_design"]["v"]
+            result.numbers = aircraft.adopted(made) or {}
+            result.standoff = tomllib.loads(read(made / "circle.toml").decode())["flight"]["law"]["standoff_m"]
         except RefusalError as error:
             result.refused = str(error).replace(f"{data_root()}/", "")
     return result
@@ -66,23 +94,20 @@ def _lines(results: list[Tried], flown: list[Tried], trimmed: list[Tried], power
     yield ""
     yield "## Adopted"
     yield ""
-    yield "Each flew a change of course by 90° and two and a half laps with the paper's law, its gains scaled."
+    yield "Each flew a change of course by 90° and two and a half laps with the paper's law, its gains scaled, in still"
+    yield "air and in wind of 0.3 of its airspeed."
     yield ""
-    yield from _table(
-        ["model", "trim", "bank loop", "90° change of course", "circle"],
-        [[each.name, *(each.found[stage] for stage in ("trim", "design", "90 deg", "circle"))] for each in flown],
-    )
+    yield "- *Bank loop* and *damping*: its bandwidth and the least damping with it, by design."
+    yield "- *Overshoot*, *rate in turn*, *altitude*: of the change of course; the rate over its command, mid-turn."
+    yield "- *Sideslip*: the largest of both."
+    yield "- *Circle*, *in wind*: the range error over the last lap, rms, in percent of the radius."
+    yield ""
+    yield from tables.markdown(_HEADINGS, [each.cells() for each in flown], "lr")
     yield ""
     yield "## Refused"
     yield ""
-    yield from _table(["model", "stage and cause"], [[each.name, each.refused] for each in results if each.refused])
-
-
-def _table(headings: list[str], rows: list[list[str]]) -> Iterator[str]:
-    yield f"| {' | '.join(headings)} |"
-    yield f"|{'---|' * len(headings)}"
-    for row in rows:
-        yield f"| {' | '.join(markdown(cell).replace('|', '/') for cell in row)} |"
+    refused = [[each.name, markdown(each.refused)] for each in results if each.refused]
+    yield from tables.markdown(["model", "stage and cause"], refused)
 
 
 @click.command()

@@ -27,7 +27,6 @@ MARKERS = {Verdict.HOLDS: "o", Verdict.FAILS: "X", Verdict.UNDECIDED: "D"}
 MOST_CELLS = 40  # drawn for a part
 SHADES, UNKNOWN, BORDER = "cividis", "#cccccc", "#D55E00"  # of maps, for colour-blind eyes too
 MOST_ACROSS, MOST_MAPS = 3, 12
-MOST_LEVEL = 8  # labels below a map
 MOST_NUMBERS = 60  # cells of a map: no numbers stand in more
 
 
