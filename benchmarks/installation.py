@@ -5,7 +5,6 @@ and without the byte code that pip made; written into the guide. Needs the packa
 """
 
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -13,12 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks.help_speed import seconds
-from harness.files import write_text
+from benchmarks.measured import keep
 
 ROOT = Path(__file__).parents[1]
 FLIGHT = ROOT / "experiments" / "stationary.toml"
 GUIDE = ROOT / "docs" / "guide" / "first_flight.md"
-MEASURED = re.compile(r"(<!-- measured -->\n).*?(<!-- /measured -->)", re.DOTALL)
 LARGEST = 3  # packages named
 
 
@@ -68,8 +66,7 @@ def lines(python: str) -> Iterator[str]:
 def main(python: str = sys.executable) -> None:
     """Write the sizes and the times into the guide, and print them."""
     block = "".join(f"- {line}\n" for line in lines(python))
-    text = GUIDE.read_text(encoding="utf-8")
-    write_text(GUIDE, MEASURED.sub(lambda found: f"{found[1]}{block}{found[2]}", text))
+    keep(GUIDE, "benchmarks.installation", block)
     print(block, end="")
 
 

@@ -9,8 +9,10 @@ import sys
 import tempfile
 import time
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.measured import keep
 from benchmarks.runs import matrix
 from harness.key import files, identity
 from harness.loop import simulate
@@ -21,8 +23,14 @@ from harness.runs.row import result_of, row
 from harness.runs.store import JOURNAL, Store
 from harness.runs.wall_time import typical_wall_time
 from harness.runs.workers import WorkerResult
+from harness.tables import markdown
 
+PAGE = Path("docs/guide/cluster.md")
 _CHUNK = 100  # flights in a message
+_HEADINGS = (
+    "flights of 100 s", "plant", "core-hours of the workers", "hours of the client", "workers it can feed", "journal",
+    "messages",
+)  # fmt: skip
 
 
 def kept(folder: Path, count: int) -> tuple[float, float, float]:
@@ -52,27 +60,40 @@ def kept(folder: Path, count: int) -> tuple[float, float, float]:
     return used / count, (folder / "out" / JOURNAL).stat().st_size / count, sent / count
 
 
-def main(count: int = 1_000_000) -> None:
-    """Print the numbers."""
+def flight_time(folder: Path, plant: str) -> float:
+    """The wall time that a flight of 100 s is estimated to take, s."""
+    of = matrix(folder, plant, 100.0, 1)
+    return typical_wall_time(of.flight(next(of.combinations())))
+
+
+def block(folder: Path, count: int) -> Iterator[str]:
+    """What was measured with so many flights, and what follows for more, in Markdown."""
+    seconds, stored, sent = kept(folder, count)
+    yield (
+        f"On paper, from one measured point: {count} empty flights through keys, messages and journal took "
+        f"{1e3 * seconds:.2f} ms of the client each,"
+    )
+    yield f"{stored:.0f} bytes of the journal and {sent:.0f} bytes of messages, without Dask's own work."
+    yield ""
+    rows = [
+        (
+            f"1e{len(str(flights)) - 1}", plant, f"{flights * took / 3600:.0f}", f"{flights * seconds / 3600:.2g}",
+            f"{took / seconds:.0f}", f"{flights * stored / 1e9:.3g} GB", f"{flights * sent / 1e9:.2g} GB",
+        )
+        for plant, took in ((plant, flight_time(folder, plant)) for plant in ("kinematic", "sixdof"))
+        for flights in (10**6, 10**8)
+    ]  # fmt: skip
+    yield from markdown(_HEADINGS, rows, "rlr")
+
+
+def main(count: int = 1_000_000, *, page: Path | None = None) -> None:
+    """Print what was measured, and write it into the page."""
     with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        seconds, stored, sent = kept(folder, count)
-        print(f"measured with {count} empty flights: {1e3 * seconds:.2f} ms of the client a flight,")
-        print(f"{stored:.0f} bytes of it in the journal, {sent:.0f} bytes of its messages")
-        print()
-        print("| flights of 100 s | plant | core-hours of the workers | hours of the client | workers it can feed |"
-              " journal | messages |")  # fmt: skip
-        print("|--:|---|--:|--:|--:|--:|--:|")
-        for plant in ("kinematic", "sixdof"):
-            of = matrix(folder, plant, 100.0, 1)
-            one = typical_wall_time(of.flight(next(iter(of.combinations()))))
-            for flights in (10**6, 10**8):
-                print(
-                    f"| 1e{len(str(flights)) - 1} | {plant} | {flights * one / 3600:.3g} |"
-                    f" {flights * seconds / 3600:.2g} | {one / seconds:.0f} | {flights * stored / 1e9:.3g} GB |"
-                    f" {flights * sent / 1e9:.2g} GB |"
-                )
+        text = "\n".join(block(Path(temporary), count)) + "\n"
+    print(text, end="")
+    if page:
+        keep(page, "benchmarks.journal", text)
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:2]))
+    main(*map(int, sys.argv[1:2]), page=PAGE)
