@@ -185,9 +185,10 @@ def kept(table: "pd.DataFrame") -> dict[tuple[str, str], list[str]]:
 def keepers_table(keepers: Mapping[tuple[str, str], Sequence[str]]) -> Iterator[str]:
     """The table, in Markdown, of `kept`: on which airframes each law keeps the promise in each condition."""
     conditions = list(dict.fromkeys(condition for condition, _ in keepers))
-    airframes = list(dict.fromkeys(airframe for _, airframe in keepers))
+    airframes = sorted({airframe for _, airframe in keepers})
+    times = Counter(law for laws in keepers.values() for law in laws)
     rows = []
-    for law, _ in Counter(law for laws in keepers.values() for law in laws).most_common():
+    for law in sorted(times, key=lambda law: (-times[law], law)):
         on = [[each for each in airframes if law in keepers.get((condition, each), ())] for condition in conditions]
         rows.append([law, *("all" if each == airframes else ", ".join(each) or "none" for each in on)])
     return markdown(["law", *conditions], rows)
