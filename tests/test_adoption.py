@@ -8,7 +8,11 @@ from pathlib import Path
 import pytest
 
 import aircraft
+from harness.adoption import adopt as adopting
+from harness.adoption.adoption import Adoption
 from harness.adoption.model import source
+from harness.adoption.refusal import RefusalError
+from harness.plants.identified import identified, is_stale
 from harness.plants.model import data_root
 from harness.settings import load_flight
 from tests.builders import invoke, write
@@ -27,7 +31,7 @@ def test_an_aircraft_is_adopted_stage_by_stage_and_its_motion_is_that_of_a_cessn
     adopted: tuple[str, Path],
 ) -> None:
     said, folder = adopted
-    stages = ["guard", "load", "engine", "controls", "trim", "linearise", "design", "90 deg", "circle"]
+    stages = ["guard", "load", "engine", "controls", "trim", "linearise", "design", "90 deg", "circle", "identify"]
     assert [line for line in stages if f"\n{line:<10} " in f"\n{said}"] == stages
     limits, motion = aircraft.limits(folder), aircraft.data(folder)["adopted"]["motion"]
     assert limits.design_airspeed == pytest.approx(43.1, abs=0.5)
@@ -51,17 +55,18 @@ def test_an_adopted_aircraft_flies_the_experiment_that_was_written_for_it(adopte
 def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tuple[str, Path]) -> None:
     _, folder = adopted
     assert {file.name for file in folder.iterdir()} == {
-        "airframe.toml", "circle.toml", "c172p.xml", "inner_loop.toml", "written.toml",
+        "airframe.toml", "circle.toml", "c172p.xml", "identified.toml", "inner_loop.toml", "written.toml",
     }  # fmt: skip
     assert list(aircraft.data(folder)["adopted"]["sources"]) == ["c172p.xml", "eng_io320.xml", "prop_75in2f.xml"]
 
 
-def test_an_identified_adopted_aircraft_is_flown_on_the_plants_between_and_predicted(
-    adopted: tuple[str, Path], tmp_path: Path
+def test_an_adopted_aircraft_is_identified_flown_on_the_plants_between_and_predicted(
+    adopted: tuple[str, Path],
 ) -> None:
-    folder = shutil.copytree(adopted[1], tmp_path / "c172p")
-    said = invoke("identify", folder, "--keep", "--out", tmp_path / "plots")
-    assert said.exit_code == 0, said.output
+    folder = adopted[1]
+    assert not is_stale(folder)
+    follows = aircraft.data(folder)["adopted"]["follows"]
+    assert follows["lag_s"] == pytest.approx(identified(folder, 43.1).measured["lag_s"], rel=1e-3)
     for plant in ("lagged", "coordinated"):
         flown = invoke("fly", folder / "circle.toml", "--set", f"plant={plant}", "--json")
         assert flown.exit_code == 0, flown.output
@@ -69,6 +74,32 @@ def test_an_identified_adopted_aircraft_is_flown_on_the_plants_between_and_predi
     predicted = invoke("predict", folder / "circle.toml")
     assert predicted.exit_code == 0, predicted.output
     assert "margin" in predicted.output
+
+
+def test_what_adopt_identifies_is_what_identify_does(adopted: tuple[str, Path], tmp_path: Path) -> None:
+    folder = shutil.copytree(adopted[1], tmp_path / "c172p")
+    aircraft.identified(folder).unlink()
+    said = invoke("identify", folder, "--keep", "--out", tmp_path / "plots")
+    assert said.exit_code == 0, said.output
+    assert aircraft.identified(folder).read_bytes() == aircraft.identified(adopted[1]).read_bytes()
+
+
+def not_identified(adoption: Adoption) -> tuple[Adoption, str]:
+    raise RefusalError("identify", "a manoeuvre ended in departed: bank of 80 deg")
+
+
+def test_an_aircraft_that_is_not_identified_is_adopted_without_the_plants_between(
+    adopted: tuple[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = shutil.copytree(adopted[1], tmp_path / "c172p")
+    monkeypatch.setattr(adopting, "_identify", not_identified)
+    said = invoke("adopt", "c172p", "--out", tmp_path)
+    assert said.exit_code == 0, said.output
+    assert "identify   without lagged and coordinated: a manoeuvre ended in departed: bank of 80 deg\n" in said.output
+    assert not aircraft.identified(folder).exists()
+    flown = invoke("fly", folder / "circle.toml", "--set", "plant=lagged")
+    assert flown.exit_code == 2
+    assert "c172p is not identified" in flown.output
 
 
 @pytest.mark.parametrize(

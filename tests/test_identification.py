@@ -1,5 +1,6 @@
 """What `harness identify` measures and fits: on responses that are known, and on the airframes."""
 
+import itertools
 import math
 import re
 from dataclasses import astuple, replace
@@ -27,7 +28,21 @@ from harness.identification.identify import (
     of_heading_rate,
     step_response,
 )  # fmt: skip
-from harness.identification.manoeuvres import CHATTER, HELD_OUT, STEP, TRAINING, Record, flown, held, lines, sweep
+from harness.identification.manoeuvres import (
+    CHATTER,
+    HELD_OUT,
+    STEP,
+    TRAINING,
+    WHOLE,
+    Programme,
+    Record,
+    begins,
+    flown,
+    held,
+    lines,
+    quick,
+    sweep,
+)
 from harness.plants.coordinated import AirspeedHold
 from harness.plants.identified import document, identified, is_stale, read
 from harness.plants.lagged import Lagged
@@ -89,6 +104,16 @@ def test_a_fit_recovers_the_airspeed_hold() -> None:
     assert astuple(found) == pytest.approx(astuple(hold), rel=1e-4)
 
 
+@pytest.mark.parametrize("programme", [WHOLE, quick(3)])
+def test_no_flight_of_a_programme_repeats_another_and_all_that_is_asked_is_flown(programme: Programme) -> None:
+    flights = programme.flights()
+    for (command, rate_trim), (other, trimmed) in itertools.permutations(flights, 2):
+        assert rate_trim != trimmed or not begins(command, other)
+    for command in (*programme.steps, *programme.entries, *programme.training.values(), *programme.held_out.values()):
+        assert any(begins(command, flown) for flown, rate_trim in flights if rate_trim)
+    assert sum(not rate_trim for _, rate_trim in flights) == len(programme.training)
+
+
 def test_a_sweep_measures_the_frequency_response() -> None:
     measured = frequency_response(record_of(KNOWN, sweep(2.0, periods=2)))
     assert measured.ratio == pytest.approx(KNOWN.at(lines()), abs=3e-3)
@@ -103,6 +128,7 @@ def test_a_step_measures_lag_gain_and_overshoot() -> None:
     step = step_response(record_of(plain(0.1, 5.0, 0.5), held([5], 10.0)))
     assert step.overshoot == pytest.approx(math.exp(-math.pi * 0.5 / math.sqrt(0.75)), rel=1e-3)
     assert step.gain == pytest.approx(1.0, abs=1e-4)
+    assert math.isnan(step_response(record_of(plain(0.1, 0.05, 0.8), held([5], 10.0))).lag)
     first_order = replace(plain(0.1, 1e3, 1.0), tail_rate=2.0, tail_share=1.0)
     assert step_response(record_of(first_order, held([5], 10.0))).lag == pytest.approx(0.1 + 0.5, abs=0.003)
 
@@ -156,7 +182,7 @@ def test_the_command_identifies_draws_keeps_and_says_how_long_is_left(
     result = invoke("identify", airframe, "--keep", "--out", tmp_path / "plots")
     assert result.exit_code == 0, result.output
     told = [line for line in result.stderr.splitlines() if line.startswith("identifying skywalker_x8: ")]
-    assert len(told) == 34  # 32 flights and two fits
+    assert len(told) == 28  # 26 flights and two fits
     assert all(re.search(r": \d+ % done, \d+ (s|min) left$", line) for line in told)
     assert "100 % done" in told[-1]
     for words in ("63 %", "bandwidth", "turn ratio", "delay", "damping", "lagged  coordinated"):

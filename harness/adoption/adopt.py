@@ -19,8 +19,9 @@ from harness.adoption.model import Original, named, source, writers
 from harness.adoption.refusal import RefusalError
 from harness.child import MEMORY, ChildError, limited
 from harness.files import make_folder, write_text
+from harness.identification.identify import identify
 from harness.plants.model import FT, SLUG, ModelError, check_body, load, unknown
-from harness.plants.plant import PlantError
+from harness.plants.plant import End, PlantError
 from harness.plants.turn import GRAVITY
 from harness.plants.wind_tunnel import STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
 
@@ -37,7 +38,8 @@ _FILES = ("{name}.xml", "airframe.toml", "inner_loop.toml", "identified.toml", "
 def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
     """Adopts the model `name` into the folder out/NAME; yields (stage, what it found). Raises `RefusalError`, OSError.
 
-    Each stage runs in a process of its own. The folder is written when all stages are through.
+    Each stage runs in a process of its own. The folder is written when all stages are through; the last, which
+    identifies the aircraft for the plants `lagged` and `coordinated`, may fail.
     """
     end = time.monotonic() + SECONDS
     model = source(name)
@@ -55,21 +57,30 @@ def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
             names=frozenset(named(model.root)),
             writers=writers(model.root),
         )
-        for stage, work in STAGES.items():
+        for stage, work in {**STAGES, "identify": _identify}.items():
             write(adoption, model)
             try:
                 adoption, line = limited(stage, max(1.0, end - time.monotonic()), MEMORY, work, adoption)
             except ChildError as error:
                 late = f"not done after {SECONDS:g} s, which a model has for all stages"
-                raise RefusalError(stage, late if error.is_late else error.cause) from None
+                refusal = RefusalError(stage, late if error.is_late else error.cause)
             except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
-                raise RefusalError(stage, " ".join(str(error).replace(f"{temporary}/", "").split())) from None
-            yield stage, line
+                refusal = RefusalError(stage, " ".join(str(error).replace(f"{temporary}/", "").split()))
+            except RefusalError as error:
+                refusal = error
+            else:
+                yield from ((stage, part) for part in line.splitlines())
+                continue
+            if stage in STAGES:
+                raise refusal from None
+            yield stage, f"without lagged and coordinated: {refusal.message}"
         write(adoption, model)
         make_folder(kept)
         for pattern in _FILES:
             if (file := folder / pattern.format(name=model.name)).exists():
                 write_text(kept / file.name, file.read_text(encoding="utf-8"))
+            else:
+                (kept / file.name).unlink(missing_ok=True)  # of an earlier adoption
         aircraft.keep_written(kept)
 
 
@@ -292,6 +303,21 @@ def _circle(a: Adoption) -> Found:
     return replace(a, flown={**a.flown, "circle": c, "circle_in_wind": w}), (
         f"radius {a.law['standoff_m']:g} m, error {100 * c.error:.2f} % rms over the last lap, altitude "
         f"{c.altitude:.1f} m, sideslip {math.degrees(c.sideslip):.1f} deg; in wind of 0.3 V {100 * w.error:.2f} %"
+    )
+
+
+def _identify(a: Adoption) -> Found:
+    """How the aircraft follows its command; two lines."""
+    try:
+        found = identify(a.folder, aircraft.limits(a.folder).design_airspeed).identified
+    except End as end:
+        raise RefusalError("identify", f"a manoeuvre ended in {end.outcome}: {end}") from None
+    a, m = replace(a, identified=found), found.measured
+    lagged, coordinated = a.worst_errors
+    return a, (
+        f"lag {m['lag_s']:.3g} s, overshoot {100 * m['overshoot']:.0f} %, gain {m['gain']:.3f}, bandwidth "
+        f"{m['bandwidth_rad_s']:.2g} rad/s\n"
+        f"lagged is wrong by {100 * lagged:.1f} % of the command at most, coordinated by {100 * coordinated:.1f} %"
     )
 
 

@@ -15,6 +15,7 @@ from harness.adoption.linear import Linear, eigenvalues_of, oscillation
 from harness.adoption.manoeuvres import Circled, Turned
 from harness.adoption.model import Original, with_inner_loop
 from harness.files import write_text
+from harness.plants.identified import Identified, document
 from harness.plants.plant import Start
 from harness.plants.wind_tunnel import Controls, TrimPoint
 
@@ -58,6 +59,13 @@ class Adoption:
     engine: str = ""
     law: Mapping[str, float] | None = None  # standoff, limit and gains of the paper's law that suit the aircraft
     flown: Mapping[str, Turned | Circled] = field(default_factory=dict)  # by what was flown
+    identified: Identified | None = None
+
+    @property
+    def worst_errors(self) -> tuple[float, float]:
+        """The largest errors of the plants lagged and coordinated, rms over the command's; NaN when not identified."""
+        errors = self.identified.errors.values() if self.identified else [(math.nan, math.nan)]
+        return max(lagged for lagged, _ in errors), max(coordinated for _, coordinated in errors)
 
 
 def write(adoption: Adoption, model: Original) -> None:
@@ -78,6 +86,8 @@ def write(adoption: Adoption, model: Original) -> None:
     write_text(folder / "airframe.toml", "\n".join(_airframe(adoption, model)) + "\n")
     if adoption.law:
         write_text(folder / "circle.toml", _circle(adoption))
+    if adoption.identified:
+        write_text(aircraft.identified(folder), document(folder, [adoption.identified]))
 
 
 def _inner_loop(tables: Mapping[str, Mapping[str, float]]) -> str:
@@ -116,6 +126,10 @@ def _airframe(a: Adoption, model: Original) -> Iterator[str]:
         yield from ("", "[adopted.loop]", *(f"{k} = {x:.4g}" for k, x in loop.items()))
     for name, flight in a.flown.items():
         yield from ("", f"[adopted.flown.{name}]", *(f"{k} = {x:.4g}" for k, x in asdict(flight).items()))
+    if a.identified:
+        errors = dict(zip(("lagged_error", "coordinated_error"), a.worst_errors, strict=True))
+        follows = {**a.identified.measured, **errors}
+        yield from ("", "[adopted.follows] # its command", *(f"{k} = {x:.4g}" for k, x in follows.items()))
     if a.linear:
         yield from ("", "[adopted.motion]", *(f"{k} = {_finite(x)}" for k, x in motion(a.linear).items()))
         yield from ("", "[adopted.derivatives] # of u', v', w', p', q', r'", *_derivatives(a.linear))

@@ -19,7 +19,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> No
     plants `lagged` and `coordinated` to them. Prints the step and frequency response, the fit, and its errors on
     manoeuvres that the fit did not use. The parameters, a step plot and a Bode plot are written to OUT; with --keep the
     parameters are kept in identified.toml beside the airframe too, for each airspeed. Takes 10 s on a quick machine and
-    a minute on a slow or busy one; how long is left is said on the way.
+    a minute on a slow or busy one; how long is left is said on the way. `harness adopt` does it, too.
 
     \b
     Examples:
@@ -57,7 +57,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> No
     except IdentifiedError:
         others = []  # a damaged file is written anew
     try:
-        with progress(f"identifying {airframe.name}", job.WORK, counted=False) as advance:
+        with progress(f"identifying {airframe.name}", job.work(airframe), counted=False) as advance:
             identification = job.identify(airframe, speed, done=advance)
     except PlantError as error:
         raise BadInput(f"--airspeed: {error}") from None

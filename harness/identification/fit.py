@@ -1,14 +1,15 @@
 """Fits linear responses to flown records by least squares."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import expm
 from scipy.optimize import least_squares
-from scipy.signal import fftconvolve, lfilter
+from scipy.signal import lfilter
 
 from autopilot.response import Response
 from harness.identification.manoeuvres import STEP
@@ -43,13 +44,14 @@ def fit(records: Sequence[Training], pace: float = 1.0) -> Response:
     """
     weights = [1.0 / math.sqrt(np.sum(record.input**2) / _COMPARED) for record in records]
     longest = max(len(record.input) for record in records)
+    convolutions = [_convolution(record.input) for record in records]
 
     def errors(x: Array) -> Array:
         kernel = pulse_response(response_of(x), longest)
         return np.concatenate(
             [
-                weight * means(_convolved(record.input, kernel) - record.output)
-                for record, weight in zip(records, weights, strict=True)
+                weight * means(convolved(kernel) - record.output)
+                for record, weight, convolved in zip(records, weights, convolutions, strict=True)
             ]
         )
 
@@ -73,7 +75,7 @@ def error(response: Response, record: Training) -> float:
 
 def followed(response: Response, command: Array) -> Array:
     """The output of the response to a command: its mean over each step, one value per step of the command."""
-    return _convolved(command, pulse_response(response, len(command)))
+    return _convolution(command)(pulse_response(response, len(command)))
 
 
 def pulse_response(response: Response, count: int) -> Array:
@@ -122,8 +124,12 @@ def airspeed_change(hold: AirspeedHold, excess: Array) -> Array:
     return np.asarray(lfilter([0.0, g, b * k - d * g], [1.0, -(a + d), a * d - b * c], np.append(excess, 0.0))[1:])
 
 
-def _convolved(command: Array, kernel: Array) -> Array:
-    return np.asarray(fftconvolve(command, kernel[: len(command)])[: len(command)])
+def _convolution(command: Array) -> Callable[[Array], Array]:
+    """A function that gives what a kernel makes of the command, whose spectrum is computed once."""
+    count = len(command)
+    size = next_fast_len(2 * count - 1, real=True)
+    spectrum = rfft(command, size)
+    return lambda kernel: np.asarray(irfft(spectrum * rfft(kernel[:count], size), size)[:count])
 
 
 def means(values: Array) -> Array:

@@ -13,16 +13,15 @@ from autopilot.response import Response
 from harness.identification import manoeuvres
 from harness.identification.fit import Array, Training, airspeed_change, fit, fit_airspeed, means
 from harness.identification.manoeuvres import (
-    CHATTER,
-    HELD_OUT,
     STEP,
     STEPS_DEG_S,
     SWEEP_PERIOD,
-    SWEPT,
-    TRAINING,
+    WHOLE,
+    Programme,
     Record,
+    begins,
     flown,
-    held,
+    quick,
     sweep,
 )
 from harness.plants.coordinated import bank_command
@@ -34,8 +33,6 @@ from harness.series import rms
 from harness.world.air import Air
 
 _BANK = State._fields.index("bank")
-_STEP_LENGTH = 10.0  # s, of each step
-_AIRSPEED_STEPS_DEG_S = (5.0, 10.0, 20.0)
 _SMALL_LAG = 0.28  # s, to 63 % of a step: of the small aircraft that the fit was made for
 
 
@@ -45,7 +42,7 @@ class StepResponse:
 
     amplitude: float  # rad/s
     rate: Array  # heading rate over the step of its command, a value per simulation step
-    lag: float  # time to 63 %, s
+    lag: float  # time to 63 %, s; NaN where it is not reached
     overshoot: float
     gain: float  # mean of the last 2 s
     turn_ratio: float  # heading rate over g tan(bank) / V, over the same 2 s
@@ -95,29 +92,32 @@ class Identification:
     airspeed_error: tuple[float, float]  # RMS, m/s, in the largest step: of the fitted hold, and of constant airspeed
 
 
-_FIT = 1400.0  # the work of fitting one response, see `WORK`
-# The work of an identification, in seconds of simulated flight
-WORK = (
-    STEP * sum(map(len, (*TRAINING.values(), *TRAINING.values(), *HELD_OUT.values(), *CHATTER.values())))
-    + _STEP_LENGTH * (len(STEPS_DEG_S) + 2 * len(_AIRSPEED_STEPS_DEG_S))
-    + 2 * SWEEP_PERIOD * len(SWEPT)
-    + 2 * _FIT
-)
+_FIT = 700.0  # the work of fitting one response, see `work`
+
+
+def work(airframe: Path) -> float:
+    """The work of an identification, in seconds of simulated flight."""
+    return STEP * sum(len(command) for command, _ in _programme(airframe).flights()) + 2 * _FIT
 
 
 def identify(airframe: Path, airspeed: float, done: Callable[[float], None] = lambda work: None) -> Identification:
-    """Flies, fits and validates at this airspeed, m/s; `done` is called after each part of `WORK`, with its size.
+    """Flies, fits and validates at this airspeed, m/s; `done` is called after each part of `work`, with its size.
 
-    The commands suit small aircraft; an adopted one has a share of them: a fast one turns slowly at a large bank.
+    The commands suit small aircraft. An adopted one has a share of them, because a fast one turns slowly at a large
+    bank; and where it follows slowly, they are slower.
 
     Raises `PlantError` when a manoeuvre cannot start, `End` when one ends early.
     """
-    scale = _scale(airframe, airspeed)
-
-    def fly(command: Array, rate_trim: bool = True) -> Record:
-        record = flown(airframe, airspeed, command * scale if scale != 1.0 else command, rate_trim)
+    scale, programme = _scale(airframe, airspeed), _programme(airframe)
+    records: list[tuple[Array, bool, Record]] = []
+    for command, rate_trim in programme.flights():
+        scaled = command * scale if scale != 1.0 else command
+        records.append((command, rate_trim, flown(airframe, airspeed, scaled, rate_trim)))
         done(STEP * len(command))
-        return record
+
+    def flight(command: Array, rate_trim: bool = True) -> Record:
+        record = next(record for known, trimmed, record in records if trimmed == rate_trim and begins(command, known))
+        return record.beginning(len(command))
 
     def fitted_to(records: Sequence[Training]) -> Response:
         response = fit(records, pace)
@@ -125,19 +125,17 @@ def identify(airframe: Path, airspeed: float, done: Callable[[float], None] = la
         return response
 
     limit = aircraft.limits(airframe).bank
-    steps = tuple(step_response(fly(held([rate], _STEP_LENGTH))) for rate in STEPS_DEG_S)
+    steps = tuple(step_response(flight(command)) for command in programme.steps)
     five = steps[STEPS_DEG_S.index(5.0)]
-    # The committed fits of the harness's own airframes, which are small, were made at the pace of 1.
-    pace = min(1.0, _SMALL_LAG / five.lag) if aircraft.adopted(airframe) else 1.0
-    sweeps = {name: frequency_response(fly(sweep(rms, periods=2))) for name, rms in SWEPT.items()}
-    heading_rate = fitted_to([of_heading_rate(fly(command)) for command in TRAINING.values()])
-    bank = fitted_to([of_bank(fly(command, rate_trim=False), limit) for command in TRAINING.values()])
-    entries = [of_airspeed(fly(held([rate, 0.0], _STEP_LENGTH))) for rate in _AIRSPEED_STEPS_DEG_S]
+    pace = min(1.0, _SMALL_LAG / _lag(airframe))
+    sweeps = {name: frequency_response(flight(sweep(rms, periods=2))) for name, rms in programme.swept.items()}
+    heading_rate = fitted_to([of_heading_rate(flight(command)) for command in programme.training.values()])
+    bank = fitted_to([of_bank(flight(command, rate_trim=False), limit) for command in programme.training.values()])
+    entries = [of_airspeed(flight(command)) for command in programme.entries]
     fitted = Identified(
         airspeed=airspeed, heading_rate=heading_rate, bank=bank, hold=fit_airspeed(entries), bank_limit=limit,
         measured={}, errors={},
     )  # fmt: skip
-    errors = {_told(name, scale): _errors(fitted, fly(command)) for name, command in {**HELD_OUT, **CHATTER}.items()}
     measured = {
         "gain": five.gain, "lag_s": five.lag, "overshoot": five.overshoot, "turn_ratio": five.turn_ratio,
         "bandwidth_rad_s": sweeps["medium"].bandwidth,
@@ -145,11 +143,35 @@ def identify(airframe: Path, airspeed: float, done: Callable[[float], None] = la
     change = airspeed_change(fitted.hold, entries[-1].input)
     return Identification(
         airframe=airframe,
-        identified=replace(fitted, measured=measured, errors=errors, sweep=sweeps["small"].sweep),
+        identified=replace(
+            fitted,
+            measured=measured,
+            errors={
+                _told(name, scale, _slower(airframe)): _errors(fitted, flight(command))
+                for name, command in programme.held_out.items()
+            },
+            sweep=next(iter(sweeps.values())).sweep,
+        ),
         steps=steps,
         sweeps=sweeps,
         airspeed_error=(rms(change - entries[-1].output), rms(entries[-1].output)),
     )
+
+
+def _programme(airframe: Path) -> Programme:
+    return quick(_slower(airframe)) if aircraft.adopted(airframe) else WHOLE
+
+
+def _slower(airframe: Path) -> int:
+    """How many times as slow the commands are: a step lasts seven lags, and no longer than a minute."""
+    return min(max(round(_lag(airframe)), 1), 4)
+
+
+def _lag(airframe: Path) -> float:
+    """About how late the aircraft follows, s."""
+    if not aircraft.adopted(airframe):
+        return _SMALL_LAG  # the committed fits of the harness's own airframes were made so
+    return 1.0 / float(aircraft.inner_loop(airframe)["gain"]["rate-trim-model-per-s"]["v"])
 
 
 def _scale(airframe: Path, airspeed: float) -> float:
@@ -160,8 +182,12 @@ def _scale(airframe: Path, airspeed: float) -> float:
     return min(1.0, float(f"{largest / math.radians(STEPS_DEG_S[-1]):.2g}"))
 
 
-def _told(manoeuvre: str, scale: float) -> str:
-    return manoeuvre if scale == 1.0 else f"{scale:g} times the {manoeuvre}"
+def _told(manoeuvre: str, scale: float, slower: int) -> str:
+    return (
+        ("" if scale == 1.0 else f"{scale:g} times the ")
+        + manoeuvre
+        + ("" if slower == 1 else f", {slower} times as slow")
+    )
 
 
 def of_heading_rate(record: Record) -> Training:
@@ -191,6 +217,8 @@ def step_response(record: Record) -> StepResponse:
     lag = STEP * (
         0.5 + float(np.interp(reached, share[[before, after]], [before, after]))
     )  # a mean over a step belongs to its middle
+    if share[after] < reached:
+        lag = math.nan
     last = slice(-round(2.0 / STEP), None)
     coordinated = rate_of_turn(record["airspeed"], record["bank"])
     gain = float(share[last].mean())

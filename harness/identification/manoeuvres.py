@@ -1,7 +1,7 @@
 """The manoeuvres that identify an airframe: their commands, and the records of flying them."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -23,6 +23,7 @@ SLOWEST, FASTEST = 0.05, 20.0  # rad/s, of the sweep
 SWEEP_PERIOD = 2.0 * math.pi / SLOWEST  # s
 SWEPT = MappingProxyType({"small": 0.5, "medium": 2.0, "large": 4.0})  # deg/s rms
 STEPS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0)
+STEP_LENGTH = 10.0  # s, of each step
 
 
 def held(levels_deg_s: Sequence[float], each: float) -> Array:
@@ -72,6 +73,66 @@ CHATTER: Mapping[str, Array] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
+class Programme:
+    """What is flown to identify an aircraft; the rate trim is off for the bank's training alone."""
+
+    swept: Mapping[str, float]  # deg/s rms, of sweeps of two periods each; the smallest first
+    steps: Sequence[Array]
+    entries: Sequence[Array]  # into turns, which move the airspeed, and out again
+    training: Mapping[str, Array]
+    held_out: Mapping[str, Array]
+
+    def flights(self) -> list[tuple[Array, bool]]:
+        """The commands to be flown, and whether the rate trim is on; none is the beginning of another."""
+        sweeps = (sweep(rms, periods=2) for rms in self.swept.values())
+        training = self.training.values()
+        trimmed = (*sweeps, *self.steps, *self.entries, *training, *self.held_out.values())
+        return [*((command, True) for command in _longest(trimmed)), *((command, False) for command in training)]
+
+
+def _longest(commands: Iterable[Array]) -> list[Array]:
+    """Those that are not the beginning of another."""
+    longest: list[Array] = []
+    for command in sorted(commands, key=len, reverse=True):
+        if not any(begins(command, other) for other in longest):
+            longest.append(command)
+    return longest
+
+
+WHOLE = Programme(
+    swept=SWEPT,
+    steps=[held([rate], STEP_LENGTH) for rate in STEPS_DEG_S],
+    entries=[held([rate, 0.0], STEP_LENGTH) for rate in STEPS_DEG_S[2:]],
+    training=TRAINING,
+    held_out=MappingProxyType({**HELD_OUT, **CHATTER}),
+)
+
+
+def quick(slower: int) -> Programme:
+    """With one sweep alone, and all other commands so many times as slow."""
+
+    def stretched(command: Array) -> Array:
+        return np.repeat(command, slower)
+
+    training = {name: command for name, command in TRAINING.items() if not name.startswith("sweep")}
+    return Programme(
+        swept={"medium": SWEPT["medium"]},
+        steps=[stretched(command) for command in WHOLE.steps],
+        entries=[stretched(command) for command in WHOLE.entries],
+        training={
+            **{name: stretched(command) for name, command in training.items()},
+            "sweep of 2 deg/s rms": sweep(SWEPT["medium"]),
+        },
+        held_out={name: stretched(command) for name, command in WHOLE.held_out.items()},
+    )
+
+
+def begins(command: Array, other: Array) -> bool:
+    """Whether `command` is the beginning of the other."""
+    return len(command) <= len(other) and np.array_equal(command, other[: len(command)])
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """A command and the states of the airframe that followed it. SI, rad."""
 
@@ -82,6 +143,10 @@ class Record:
     def __getitem__(self, field: str) -> Array:
         """A field of the state, by name, at the end of each step."""
         return self.states[1:, State._fields.index(field)]
+
+    def beginning(self, steps: int) -> "Record":
+        """The record of the first steps."""
+        return replace(self, command=self.command[:steps], states=self.states[: steps + 1])
 
     @property
     def heading_rate(self) -> Array:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from autopilot.response import Response
 from harness.identification.identify import Identification
+from harness.identification.manoeuvres import STEP
 from harness.tables import table
 
 BOUND = 0.05  # of the command, RMS: manoeuvres with a larger error are named
@@ -17,7 +18,8 @@ def summary_lines(identification: Identification) -> Iterator[str]:
     fitted = identification.identified
     yield f"{identification.airframe.name} at {fitted.airspeed:g} m/s"
     yield ""
-    yield "Step response of the heading rate (psi_a); the gain and the later columns are taken 10 s after the step:"
+    length = STEP * len(identification.steps[0].rate)
+    yield f"Step response of the heading rate (psi_a); gain and later columns are taken {length:g} s after the step:"
     yield from table(
         ["step\ndeg/s", "lag (63 %)\ns", "overshoot\n%", "gain", "turn ratio", "bank\ndeg"],
         (

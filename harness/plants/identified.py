@@ -55,7 +55,7 @@ class Identified:
     bank_limit: float  # of the inner loop's command
     measured: Mapping[str, float]  # figures of the flown step and sweep, by name
     errors: Mapping[str, tuple[float, float]]  # by validation manoeuvre: (lagged, coordinated), RMS over the command's
-    sweep: Sweep | None = None  # of `manoeuvres.SWEPT["small"]`; None in a file of an earlier version
+    sweep: Sweep | None = None  # of the smallest commands swept; None in a file of an earlier version
 
     @property
     def lagged(self) -> Lagged:
