@@ -13,6 +13,7 @@ import pytest
 
 import harness
 from harness.verdict import grid
+from harness.verdict.answer import change_summary, changes
 from tests.builders import chromium, command, copied_airframe, invoke, result, results, write
 from tests.printed import sheets
 
@@ -321,3 +322,19 @@ def test_many_axes_of_which_few_combinations_were_flown_are_mapped_at_once() -> 
     maps = grid.maps(table, axes, "range_error_rms_m", ["plant"])
     assert sum(len(each.cells) for each in maps) == 2 * len(flown)
     assert len(maps) == 2 * (1 + 2 * 8)
+
+
+def test_the_summary_of_a_page_says_of_each_metric_what_the_table_says(flown: Path) -> None:
+    (card,) = harness.compare(flown, by="law.max_heading_rate_deg_s").answering
+    everywhere: dict[str, str] = {}
+    differing: dict[str, str] = {}
+    for line in change_summary(card):
+        word, titles = line.split(": ", 1)
+        if word.startswith("not"):
+            differing.update(re.findall(r"(?:^|, )([^(,]+) \(([^)]+)\)", titles))
+        else:
+            everywhere.update(dict.fromkeys(titles.split(", "), word.split()[0]))
+    assert everywhere
+    for change in changes(card):
+        found = differing.get(change.metric) or everywhere.get(change.metric, "undecided")
+        assert change.found.startswith(found)

@@ -19,11 +19,13 @@ from harness.flight import MetricSettings
 from harness.log import COLUMNS, FlightLog
 from harness.loop import simulate
 from harness.plants.plant import Outcome
+from harness.review.charts import charts
 from harness.review.lanes import BRIEF, lanes_by_flight, without_cut_words
 from harness.review.reading import read_logs, read_recording
 from harness.review.recorder import Recorder, clean_up
 from harness.review.recording import write_recording
 from harness.review.seal import PLACEHOLDER, TEXT
+from harness.review.styled import styled
 from harness.review.viewer import RERUN, quiet
 from harness.world.wind import Wind
 from tests.builders import FLIGHT, SIXDOF
@@ -275,11 +277,13 @@ def test_a_file_that_breaks_off_leaves_the_old_one_and_nothing_else(kinematic: F
 WRITING = """
 import sys
 from pathlib import Path
+from harness.review.charts import charts
 from harness.review.lanes import lanes_by_flight
 from harness.review.reading import read_logs
 from harness.review.recorder import Recorder, clean_up
 from harness.review.recording import write_recording
 from harness.review.seal import PLACEHOLDER, TEXT
+from harness.review.styled import styled
 
 logs = read_logs(Path(sys.argv[1]))
 for i in range(1000):
@@ -346,3 +350,12 @@ def test_chatter_has_a_lane_that_convergence_does_not_hide() -> None:
     assert list(lanes_by_flight({"a b": chattering, "a=b": chattering})) == [
         "/circle/a-b", "/chatter/a-b", "/circle/a-b-2", "/chatter/a-b-2",
     ]  # fmt: skip
+
+
+def test_where_no_flight_circled_the_error_round_the_circle_is_not_drawn() -> None:
+    log = simulate(replace(FLIGHT, duration=75.0, law=law("nftsm", "fitted")))
+    azimuth = next(chart for chart in charts(styled(dict.fromkeys("abc", log))) if chart.name == "azimuth")
+    for line in azimuth.lines[1:]:
+        assert line.strips
+        widths = [np.diff(strip[:, 0]) for strip in line.strips]
+        assert np.concatenate(widths) == pytest.approx(5.0)  # degrees: one slice of the circle to the next

@@ -25,6 +25,7 @@ _FRAME: Colour = (75, 75, 75)
 _BLACK: Colour = (0, 0, 0)
 _SLICES = 72  # of the circle: of many flights only the mean of each is drawn
 _LEAST_AMPLITUDE = 1e-3  # deg/s
+_LABEL = 0.3  # powers of ten: height of a label in the spectrum
 _MOVES = 0.1  # s between two places on the map
 _MOST_TICKS = 7
 _STEPS = (1.0, 2.0, 5.0)
@@ -160,21 +161,22 @@ def _around(flights: Sequence[StyledFlight]) -> Chart:
 
 
 def _by_azimuth(azimuth: Array, error: Array, *, mean: bool) -> list[Array]:
-    """The strips of a flight, broken where it passes north; or the mean of each slice of the circle."""
+    """The strips of a flight, broken where it passes north; or the mean of each slice of the circle flown."""
     if mean:
         slices = np.floor(azimuth / 360.0 * _SLICES).astype(int)
         counts = np.bincount(slices, minlength=_SLICES)
         known = np.flatnonzero(counts)
         means = np.bincount(slices, error, minlength=_SLICES)[known] / counts[known]
-        return [np.column_stack([(known + 0.5) * 360.0 / _SLICES, means])]
-    ends = np.flatnonzero(np.abs(np.diff(azimuth)) > 180.0) + 1
-    points = np.split(np.column_stack([azimuth, error]), ends)
-    return [strip for strip in points if len(strip) > 1]
+        points, breaks = np.column_stack([(known + 0.5) * 360.0 / _SLICES, means]), np.diff(known) > 1
+    else:
+        points, breaks = np.column_stack([azimuth, error]), np.abs(np.diff(azimuth)) > 180.0
+    return [strip for strip in np.split(points, np.flatnonzero(breaks) + 1) if len(strip) > 1]
 
 
 def _spectrum(flights: Sequence[StyledFlight]) -> Chart:
     """The amplitude of the law's command at each frequency, both in powers of ten, while circling is judged."""
-    lines, labels = [], []
+    lines: list[ChartLine] = []
+    labels: list[tuple[float, float, str, Colour]] = []
     for flight in flights:
         signals = Signals(flight.log)
         frequency, amplitude = spectrum(signals.circling("heading_rate_command"), signals.period)
@@ -184,10 +186,11 @@ def _spectrum(flights: Sequence[StyledFlight]) -> Chart:
         lines.append(ChartLine([points], flight.colour, flight.width))
         if cycle := signals.limit_cycle:
             at = points[max(0, int(np.searchsorted(frequency, cycle.frequency, side="right")) - 1)]
-            labels.append((float(at[0]), float(at[1]) + 0.5, f"limit cycle, {cycle.frequency:.2g} Hz", flight.colour))
+            above = float(at[1]) + 0.5 + _LABEL * len(labels)
+            labels.append((float(at[0]), above, f"limit cycle, {cycle.frequency:.2g} Hz", flight.colour))
     points = np.vstack([strip for line in lines for strip in line.strips] or [np.zeros((1, 2))])
     low, high = points[:, 0].min(), max(points[:, 0].max(), points[:, 0].min() + 1.0)
-    top = max(float(np.ceil(points[:, 1].max() + 0.2)), 0.0)
+    top = max(float(np.ceil(max([points[:, 1].max() + 0.2, *(y for _, y, *_ in labels)]))), 0.0)
     x, y = (
         ChartAxis(lowest, highest, _decade_ticks(lowest, highest, unit), length / (highest - lowest))
         for lowest, highest, unit, length in (

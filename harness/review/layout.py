@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 
 from harness.review.charts import Chart, chart_view
 from harness.review.lanes import LANES_OF_SEVERAL
-from harness.review.plots import DECADES, Plot, span
+from harness.review.plots import DECADES, Plot, extent
 from harness.review.recorder import Recorder
 from harness.review.scene import chase_view, scene_view
 from harness.review.styled import WORDS, Colour, StyledFlight, is_crowd
@@ -176,7 +176,7 @@ def _around_the_cursor(content: Content) -> Tab:
     else:
         plots = [plot for plot in content.overview if plot.name != DECADES]
     size = _Size(0.6 * _WIDTH, _HEIGHT / max(1, len(plots)))
-    besides = [_beside(_settled(plot) if plot.name in _NEAR else plot, size) for plot in plots]
+    besides = [_beside_settled(plot, size) if plot.name in _NEAR else _beside(plot, size) for plot in plots]
     widest = max(besides, default=0.0)
     right = []
     of_flight = flights if content.crowd else [None] * len(plots)
@@ -214,15 +214,11 @@ def _target(content: Content) -> Tab:
 
 
 def _notes(content: Content) -> Tab:
-    views: list[Tab] = [
-        rrb.TextDocumentView(origin="/notes/result", name="Result"),
-        rrb.TextDocumentView(origin="/notes/settings", name="Settings, provenance"),
-    ]
-    shares = [3.0, 2.0]
-    if content.crowd:  # whose overview has no room for them
-        views.append(_event_view())
-        shares.append(1.5)
-    return rrb.Horizontal(*views, column_shares=shares, name="Notes")
+    result = rrb.TextDocumentView(origin="/notes/result", name="Result")
+    settings: Tab = rrb.TextDocumentView(origin="/notes/settings", name="Settings, provenance")
+    if content.crowd:  # whose overview has no room for events
+        settings = rrb.Vertical(settings, _event_view())
+    return rrb.Horizontal(result, settings, column_shares=(6.0, 5.0) if content.crowd else (3.0, 2.0), name="Notes")
 
 
 def _event_view() -> rrb.View:
@@ -334,15 +330,14 @@ def _whole_flight(content: Content, gutter: float, width: float, beside: float, 
 
 
 def _around(missing: float, width: float) -> rrb.TimeAxis:
-    """The time axis around the cursor: it begins so much earlier as numbers beside the plot are `missing`, points."""
-    begin = -_CURSOR - 2.0 * _CURSOR * missing / width
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=s) for s in (begin, _CURSOR))
+    """The time axis around the cursor: it begins so much earlier as numbers beside the plot are `missing`, points.
+
+    It ends with room for half of the last label.
+    """
+    point = 2.0 * _CURSOR / (width - _LABEL)
+    both_ends = (-_CURSOR - point * missing, _CURSOR + point * _LABEL)
+    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=s) for s in both_ends)
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(*ends))
-
-
-def _settled(plot: Plot) -> Plot:
-    """The plot with the range of its second half."""
-    return plot._replace(span=span([s._replace(values=s.values[len(s.values) // 2 :]) for s in plot.series]))
 
 
 def _scale(plot: Plot, size: _Size) -> tuple[float, float]:
@@ -383,7 +378,19 @@ def _step(low: float, high: float, size: _Size) -> float:
 
 def _beside(plot: Plot, size: _Size) -> float:
     """The width of the numbers beside a plot, points."""
-    low, high = _scale(plot, size)
+    return _written(*_scale(plot, size), size)
+
+
+def _beside_settled(plot: Plot, size: _Size) -> float:
+    """The same where the axis follows the values in view, of the second half of the flight: it ends at the values."""
+    halves = [series._replace(values=series.values[len(series.values) // 2 :]) for series in plot.series]
+    low, high = extent(halves)
+    flat = 0.5 if high == low else 0.0  # to either side, as Rerun does
+    return _written(low - flat, high + flat, size)
+
+
+def _written(low: float, high: float, size: _Size) -> float:
+    """The width of the numbers that Rerun writes beside an axis, points."""
     decimals = max(0, -round(math.log10(_step(low, high, size))))
     texts = [f"{number:.{decimals}f}" for number in _numbers(low, high, size)]
     widths = [_DIGIT * sum(map(str.isdigit, text)) + _MINUS * ("-" in text) + _POINT * ("." in text) for text in texts]

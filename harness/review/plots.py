@@ -153,7 +153,7 @@ def level(label: str, values: Sequence[float], until: float, colour: Colour = GR
 
 def span(series: Sequence[Series], least: float = 0.1) -> tuple[float, float]:
     """The range of all values with a margin, at least `least` wide."""
-    low, high = _extent(series)
+    low, high = extent(series)
     if not high - low >= least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
     margin = 0.08 * (high - low)
@@ -245,7 +245,7 @@ def _bounds(name: str, flights: Sequence[StyledFlight]) -> list[Series]:
 def _span(content: _Content, series: Sequence[Series], flights: Sequence[StyledFlight]) -> tuple[float, float]:
     """The range of a plot: range errors of the first half are clipped, heading rates are shown up to their limit."""
     if content.in_decades:
-        return LEAST_DECADE - 0.3, max(_extent(series)[1] + 0.3, 0.5)
+        return LEAST_DECADE - 0.3, max(extent(series)[1] + 0.3, 0.5)
     if content.name == "range_error":
         near = max(0.5 * flight.log.flight.law.standoff for flight in flights)
         clipped = [
@@ -260,7 +260,8 @@ def _span(content: _Content, series: Sequence[Series], flights: Sequence[StyledF
     return span(series, content.least)
 
 
-def _extent(series: Sequence[Series]) -> tuple[float, float]:
+def extent(series: Sequence[Series]) -> tuple[float, float]:
+    """The lowest and the highest finite value; 0 and 0 without any."""
     values = np.concatenate([s.values.ravel() for s in series])
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)

@@ -17,7 +17,6 @@ from harness.verdict.statistics import Share
 from harness.vocabulary import Verdict
 
 ALIKE = "alike"  # a difference that is shown to lie within its margin
-DEPENDS = "not in every cell, or not the same way"
 CHANGE_HEADINGS = ("metric", "in cells", "largest difference", "margin", "where")
 
 
@@ -189,40 +188,43 @@ class ChangeLine(NamedTuple):
 
 def changes(card: Scorecard) -> Iterator[ChangeLine]:
     """The metrics with a margin, and those that are lower or higher anywhere."""
-    for column in dict.fromkeys(judgement.column for judgement in card.judgements):
-        judgements = card.of(column)
-        counts = Counter(map(_direction, judgements))
-        if judgements[0].has_margin:
-            of, title = worst(card, PARTS[column]), PARTS[column].title
-            margin = bound(of, PARTS[column]).removeprefix("within ")
-        else:
-            told = [j for j in judgements if j.word in (HIGHER, LOWER)]
-            if not told:
-                continue
-            of, title, margin = max(told, key=lambda j: abs(j.difference)), column, ""
-            if plain(of.difference) == "0":
-                continue
-        if len(judgements) == 1:
-            found = next(iter(counts))
-        else:
-            words = (f"{word} {counts[word]}" for word in (LOWER, HIGHER, ALIKE, Verdict.UNDECIDED) if counts[word])
-            found = f"{', '.join(words)} of {len(judgements)}"
-        yield ChangeLine(title, found, value(of), margin, place(of.at) if len(judgements) > 1 else "")
+    for title, largest, counts in _changed(card):
+        cells = counts.total()
+        margin = bound(largest, PARTS[largest.column]).removeprefix("within ") if largest.has_margin else ""
+        found = _counted_words(counts) if cells > 1 else next(iter(counts))
+        yield ChangeLine(title, found, value(largest), margin, place(largest.at) if cells > 1 else "")
 
 
 def change_summary(card: Scorecard) -> Iterator[str]:
     """A line for each word: the metrics that are lower, higher or alike wherever they were judged; then the others."""
-    by_word: dict[str, list[str]] = {}
+    alike: dict[str, list[str]] = {LOWER: [], HIGHER: [], ALIKE: []}
+    differing: list[str] = []
+    for title, _, counts in _changed(card):
+        if len(counts) > 1:
+            differing.append(f"{title} ({_counted_words(counts)})")
+        elif (word := next(iter(counts))) in alike:
+            alike[word].append(title)
+    yield from (f"{word} in every cell: {', '.join(titles)}" for word, titles in alike.items() if titles)
+    if differing:
+        yield f"not the same in every cell: {', '.join(differing)}"
+
+
+def _changed(card: Scorecard) -> Iterator[tuple[str, Judgement, Counter[str]]]:
+    """Of the metrics with a margin, and of those that differ anywhere: title, largest difference, words by cell."""
     for column in dict.fromkeys(judgement.column for judgement in card.judgements):
-        words = {_direction(judgement) for judgement in card.of(column)}
-        title = PARTS[column].title if column in PARTS else column
-        if len(words) == 1:
-            by_word.setdefault(next(iter(words)), []).append(title)
-        elif words & {LOWER, HIGHER}:
-            by_word.setdefault(DEPENDS, []).append(title)
-    for word in (LOWER, HIGHER, ALIKE, DEPENDS):
-        if word in by_word:
-            yield f"{word}{' in every cell' if word != DEPENDS else ''}: {', '.join(by_word[word])}"
+        judgements = card.of(column)
+        counts = Counter(map(_direction, judgements))
+        if judgements[0].has_margin:
+            yield PARTS[column].title, worst(card, PARTS[column]), counts
+        elif told := [judgement for judgement in judgements if judgement.word in (HIGHER, LOWER)]:
+            largest = max(told, key=lambda judgement: abs(judgement.difference))
+            if plain(largest.difference) != "0":
+                yield column, largest, counts
+
+
+def _counted_words(counts: Counter[str]) -> str:
+    words = (f"{word} {counts[word]}" for word in (LOWER, HIGHER, ALIKE, Verdict.UNDECIDED) if counts[word])
+    return f"{', '.join(words)} of {counts.total()}"
 
 
 def _direction(judgement: Judgement) -> str:
