@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from harness.error import HarnessError
-from harness.spawn import SPAWN, THREADS
+from harness.spawn import SPAWN
+from harness.threads import use_one_thread
 
 SECONDS = 60.0  # on the clock
 MEMORY = 2 << 30  # bytes more than the process has when the function is called
@@ -136,7 +137,7 @@ def _server() -> _Server:
 def _serve(calls: Connection) -> None:
     """Answers one call after the other until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.environ.update(dict.fromkeys(THREADS, "1"))  # a fork has only one
+    use_one_thread()  # a fork has only one
     while True:
         try:
             call = _Call(*calls.recv())

@@ -17,7 +17,8 @@ from typing import Any, TypeVar
 from pebble import ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
-from harness.spawn import SPAWN, THREADS
+from harness.spawn import SPAWN
+from harness.threads import use_one_thread
 
 Result = TypeVar("Result")
 
@@ -26,8 +27,7 @@ _AHEAD = 2  # jobs per worker that are sent out: one in work, one waiting; a ful
 
 def started(workers: int, prepare: Callable[..., None] | None = None, arguments: Sequence[Any] = ()) -> ProcessPool:
     """A pool whose workers are there; each calls `prepare` with the arguments first. Libraries in it use one thread."""
-    for name in THREADS:  # before spawn: a library reads it when it is loaded
-        os.environ[name] = "1"
+    use_one_thread()  # before spawn: a library reads it when it is loaded
     # Threads and processes started now leave Ctrl-C to this thread.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

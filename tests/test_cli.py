@@ -399,3 +399,21 @@ def test_on_a_terminal_tables_fit_and_in_a_pipe_a_row_is_a_line(columns: int) ->
     assert "\x1b[" not in "".join(shown)
     piped = command("list", "metrics").stdout.splitlines()
     assert len(piped) == len(METRICS) + 2
+
+
+def test_the_numeric_libraries_of_a_command_use_one_thread() -> None:
+    """Of many, on a busy machine, each waits for the others: it took ten times as long."""
+    code = """if True:
+        import os, sys
+        from harness.cli.main import main
+        sys.argv = ["harness", "predict", "experiments/stationary.toml"]
+        try:
+            main()
+        finally:
+            import numpy as np
+            np.linalg.svd(np.ones((2000, 50)))
+            print(len(os.listdir("/proc/self/task")), file=sys.stderr)
+    """
+    many = {name: value for name, value in os.environ.items() if not name.endswith("_THREADS")}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, env=many)
+    assert done.stderr.splitlines()[-1] == "1"

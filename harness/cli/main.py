@@ -19,6 +19,7 @@ from harness.cli._stdout import guard
 from harness.error import HarnessError
 from harness.neighbours import in_the_way
 from harness.tables import WIDTH
+from harness.threads import use_one_thread
 
 
 class Entry(NamedTuple):
@@ -125,6 +126,7 @@ def harness() -> None:
 def main() -> None:
     """The entry point."""
     guard()
+    use_one_thread()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # in order: what was flown is kept
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     if message := in_the_way():
