@@ -152,6 +152,21 @@ def adopted(airframe: Path) -> dict[str, Any] | None:
     return found if isinstance(found, dict) else None
 
 
+def adopted_lag(airframe: Path) -> float | None:
+    """How late an adopted aircraft follows the command of its bank, s; None for one of the harness's kind.
+
+    Raises `AirframeError` where its data do not say.
+    """
+    if (found := adopted(airframe)) is None:
+        return None
+    loop = found.get("loop")
+    lag = loop.get("lag") if isinstance(loop, dict) else None
+    if not isinstance(lag, float | int) or not 0.0 < lag < math.inf:
+        file = airframe / "airframe.toml"
+        raise AirframeError(f"{file}: adopted.loop.lag must be a number above 0: run `harness adopt` again")
+    return float(lag)
+
+
 def inner_loop(airframe: Path) -> dict[str, Any]:
     """The gains and limits of an airframe's inner loop. Raises `AirframeError`."""
     return _read(airframe / "inner_loop.toml")

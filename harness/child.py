@@ -1,7 +1,8 @@
 """Running a function in a process of its own, with limits: what it does to that process, it does not do to this one.
 
-A server, which is started once, has imported the module of the function; each call is a fork of it, and takes some
-milliseconds. Server and child end with this process, and use pipes alone: no file and no socket that others could find.
+A server, which is started once for each thread that asks, has imported the module of the function; each call is a fork
+of it, and takes some milliseconds. Server and child end with this process, and use pipes alone: no file and no socket
+that others could find.
 """
 
 import math
@@ -58,7 +59,9 @@ def limited(
     """`in_child` with other limits: bytes, and seconds on the clock, which each call of `alive` starts anew."""
     modules = {function.__module__, *(type(given).__module__ for given in args)} - {"__main__"}
     call = _Call(seconds, memory, tuple(sorted(modules)), pickle.dumps((function, args, kwargs)))
-    ended, message = _server().answer(call)
+    server = _idle()
+    ended, message = server.answer(call)
+    _servers.append(server)
     if ended is None:
         raise ChildError(stage, f"was not done in {seconds:g} s", is_late=True)
     if not message:
@@ -100,7 +103,6 @@ class _Server:
         self._process = SPAWN.Process(target=_serve, args=(calls,), daemon=True)
         self._process.start()
         calls.close()
-        self._lock = threading.Lock()
         self._of = os.getpid()
 
     @property
@@ -109,26 +111,26 @@ class _Server:
         return self._of == os.getpid() and self._process.is_alive()
 
     def answer(self, call: _Call) -> _Answer:
-        with self._lock:
-            try:
-                self._calls.send(call)
-                return _Answer(*self._calls.recv())
-            except (EOFError, OSError):
-                self._process.join()
-                return _Answer(self._process.exitcode, b"")
-            except BaseException:  # Ctrl-C: the child ends with the server
-                self._process.kill()
-                self._process.join()
-                raise
+        try:
+            self._calls.send(call)
+            return _Answer(*self._calls.recv())
+        except (EOFError, OSError):
+            self._process.join()
+            return _Answer(self._process.exitcode, b"")
+        except BaseException:  # Ctrl-C: the child ends with the server
+            self._process.kill()
+            self._process.join()
+            raise
 
 
-_servers: list[_Server] = []  # the last one serves
+_servers: list[_Server] = []  # those that answer nobody now: a thread that asks has one for itself
 
 
-def _server() -> _Server:
-    if not (_servers and _servers[-1].serves):
-        _servers.append(_Server())
-    return _servers[-1]
+def _idle() -> _Server:
+    while _servers:
+        if (server := _servers.pop()).serves:
+            return server
+    return _Server()
 
 
 # In the server

@@ -64,6 +64,9 @@ def simulate(flight: Flight, watch: "Watch | None" = None) -> FlightLog:
 
     `watch(time, so_far)` is called after each row with the time in s and a function that returns the log so far.
 
+    It is flown in this process, also on a JSBSim model that does not come with the harness; such a model is a program
+    and may end the process. `run`, with workers, and `harness fly` fly it in a process of its own.
+
     Raises `SettingsError` when the flight cannot be flown as it is set, with one line for each mistake in the keys and
     units of a settings file; `PlantError` when the aircraft cannot start so.
 

@@ -52,6 +52,26 @@ def test_an_adopted_aircraft_flies_the_experiment_that_was_written_for_it(adopte
     assert metrics["bank_peak_deg"] < math.degrees(aircraft.limits(folder).bank)
 
 
+def test_the_course_rate_is_the_commanded_one_and_a_step_winds_nothing_up(adopted: tuple[str, Path]) -> None:
+    flown, follows = (aircraft.data(adopted[1])["adopted"][name] for name in ("flown", "follows"))
+    assert flown["turn"]["rate"] == pytest.approx(1.0, abs=0.05)
+    assert flown["turn"]["sideslip"] < math.radians(0.5)
+    assert follows["gain"] == pytest.approx(1.0, abs=0.01)
+    assert follows["overshoot"] < 0.06
+
+
+def test_an_aircraft_of_an_earlier_adoption_that_lacks_its_lag_is_not_identified_but_told(
+    adopted: tuple[str, Path], tmp_path: Path
+) -> None:
+    folder = shutil.copytree(adopted[1], tmp_path / "c172p")
+    data = (folder / "airframe.toml").read_text(encoding="utf-8")
+    write(folder / "airframe.toml", data.replace("\nlag = ", "\nlead = "))
+    aircraft.keep_written(folder)
+    said = invoke("identify", folder, "--out", tmp_path / "plots")
+    assert said.exit_code == 2
+    assert "adopted.loop.lag must be a number above 0: run `harness adopt` again" in said.output
+
+
 def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tuple[str, Path]) -> None:
     _, folder = adopted
     assert {file.name for file in folder.iterdir()} == {
@@ -118,16 +138,33 @@ def test_a_model_that_cannot_fly_is_refused_with_its_cause_and_leaves_no_folder(
     assert not (tmp_path / "out" / model).exists()
 
 
-def test_a_command_without_a_standard_name_is_found_by_what_it_moves(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def altered(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """The same of a c172p whose aileron has a name of its own, and whose rudder goes no further than a tenth."""
     model = (data_root() / "aircraft" / "c172p" / "c172p.xml").read_text(encoding="utf-8")
-    folder = tmp_path / "renamed"
+    model = model.replace("fcs/aileron-cmd-norm", "fcs/my-roll-cmd")
+    before, rudder, after = model.partition("<input>fcs/rudder-cmd-norm</input>")
+    assert rudder
+    after = after.replace("<min>-1</min>", "<min>-0.1</min>", 1).replace("<max>1</max>", "<max>0.1</max>", 1)
+    folder = tmp_path_factory.mktemp("altered") / "altered"
     folder.mkdir()
-    write(folder / "renamed.xml", model.replace("fcs/aileron-cmd-norm", "fcs/my-roll-cmd"))
+    write(folder / "altered.xml", before + rudder + after)
     for engine in ("eng_io320", "prop_75in2f"):
         shutil.copy(data_root() / "engine" / f"{engine}.xml", folder)
-    said = invoke("adopt", folder / "renamed.xml", "--out", tmp_path / "out")
+    said = invoke("adopt", folder / "altered.xml", "--out", folder.parent / "out")
     assert said.exit_code == 0, said.output
-    assert aircraft.data(tmp_path / "out" / "renamed")["adopted"]["controls"]["aileron"] == "fcs/my-roll-cmd"
+    return said.output, folder.parent / "out" / "altered"
+
+
+def test_a_command_without_a_standard_name_is_found_by_what_it_moves(altered: tuple[str, Path]) -> None:
+    assert aircraft.data(altered[1])["adopted"]["controls"]["aileron"] == "fcs/my-roll-cmd"
+
+
+def test_what_stands_between_a_command_and_its_surface_is_told(
+    altered: tuple[str, Path], adopted: tuple[str, Path]
+) -> None:
+    assert "\nlinearise  rudder does -0.82, -0.55, -0.2 rad/s^2 per command of 1, 3 and 8 times the size" in altered[0]
+    assert "stands between" not in adopted[0]
 
 
 def test_a_bare_name_is_a_model_of_jsbsim_whatever_folder_lies_about(

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jsbsim
@@ -251,6 +252,20 @@ def test_what_a_child_returns_or_raises_is_there_and_how_it_ended_is_told(tmp_pa
         limited("circle", 0.3, 1 << 30, spin)
     with pytest.raises(OSError, match="too large"):
         in_child("load", write_to, tmp_path / "file")
+
+
+def wait_for(file: Path) -> bool:
+    while not file.exists():
+        time.sleep(0.05)
+    return True
+
+
+def test_a_child_does_not_wait_for_that_of_another_thread(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(1) as other:
+        waits = other.submit(limited, "wait", 30.0, 1 << 30, wait_for, tmp_path / "file")
+        assert in_child("load", max, 2, 3) == 3
+        (tmp_path / "file").touch()
+        assert waits.result()
 
 
 WAITING = """

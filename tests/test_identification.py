@@ -104,6 +104,14 @@ def test_a_fit_recovers_the_airspeed_hold() -> None:
     assert astuple(found) == pytest.approx(astuple(hold), rel=1e-4)
 
 
+def test_an_airframe_is_flown_from_a_relative_folder_as_from_an_absolute_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(aircraft.FOLDER)
+    here, there = (
+        flown(folder, 18.0, held([5], 0.1)) for folder in (Path("skywalker_x8"), aircraft.folder("skywalker_x8"))
+    )
+    assert np.array_equal(here.states, there.states)
+
+
 @pytest.mark.parametrize("programme", [WHOLE, quick(3)])
 def test_no_flight_of_a_programme_repeats_another_and_all_that_is_asked_is_flown(programme: Programme) -> None:
     flights = programme.flights()

@@ -13,7 +13,7 @@ import numpy as np
 import aircraft
 from harness.adoption.adoption import STANDARD, STEP, Adoption, Wish, motion, write
 from harness.adoption.design import designed
-from harness.adoption.linear import linearised
+from harness.adoption.linear import COMMANDS, linearised
 from harness.adoption.manoeuvres import circled, law_of, turned
 from harness.adoption.model import Original, named, source, writers
 from harness.adoption.refusal import RefusalError
@@ -248,11 +248,17 @@ def _linearise(a: Adoption) -> Found:
     a = replace(a, linear=linearised(tunnel), stall=_stall(tunnel))
     assert a.linear is not None
     m = motion(a.linear)
-    lags = ", ".join(f"{name} {m[f'{name}_lag']:.2g} s" for name in ("elevator", "aileron", "rudder", "throttle"))
+    lags = ", ".join(f"{name} {m[f'{name}_lag']:.2g} s" for name in COMMANDS)
+    uneven = "".join(
+        f"\n{name} does {', '.join(f'{effect:.2g}' for effect in getattr(a.linear, name).growing)} rad/s^2 per command "
+        f"of 1, 3 and 8 times the size: something of the model stands between command and surface"
+        for name in COMMANDS[:-1]
+        if getattr(a.linear, name).is_uneven
+    )
     return a, (
         f"roll {m['roll_time']:.3g} s, dutch roll {m['dutch_roll']:.3g} rad/s ({m['dutch_roll_damping']:.2f}), short "
         f"period {m['short_period']:.3g} rad/s ({m['short_period_damping']:.2f}), aileron {m['aileron_effect']:.3g} "
-        f"rad/s^2, lags: {lags}; stall {math.degrees(a.stall):.0f} deg"
+        f"rad/s^2, lags: {lags}; stall {math.degrees(a.stall):.0f} deg{uneven}"
     )
 
 
@@ -277,15 +283,14 @@ def _design(a: Adoption) -> Found:
     assert a.linear is not None
     wanted = math.inf if a.wish.bandwidth is None else a.wish.bandwidth
     g = designed(a.linear, a.setting._asdict(), a.stall, a.wish.max_bank, wanted)
-    law = law_of(a.start.airspeed, a.wish.max_bank, g.gain["rate-trim-model-per-s"])
+    law = law_of(a.start.airspeed, a.wish.max_bank, 1.0 / g.lag)
     told = f"bank loop {g.bandwidth:.2g} rad/s, limited by {g.limited_by}; least damping {g.damping:.2f}"
     return replace(a, gains=g, law=law), told
 
 
 def _turn(a: Adoption) -> Found:
     assert a.gains is not None
-    lag = 1.0 / a.gains.gain["rate-trim-model-per-s"]
-    t = turned(a.folder, a.start, STEP, a.wish.max_bank, lag)
+    t = turned(a.folder, a.start, STEP, a.wish.max_bank, a.gains.lag)
     if faults := t.faults(a.start.airspeed):
         raise RefusalError("90 deg", "; ".join(faults))
     return replace(a, flown={"turn": t}), (

@@ -10,8 +10,8 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import aircraft
-from harness.adoption.design import LoopDesign
-from harness.adoption.linear import Linear, eigenvalues_of, oscillation
+from harness.adoption.design import ADOPTED_GAINS, LoopDesign
+from harness.adoption.linear import COMMANDS, Linear, eigenvalues_of, oscillation
 from harness.adoption.manoeuvres import Circled, Turned
 from harness.adoption.model import Original, with_inner_loop
 from harness.files import write_text
@@ -21,7 +21,7 @@ from harness.plants.wind_tunnel import Controls, TrimPoint
 
 STEP = 0.005  # s, of all that is flown here
 STANDARD = Controls("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm", ("fcs/throttle-cmd-norm",))
-_NO_GAINS = {"sideslip-i": 0.0, "sideslip-limit": 0.0, "aileron-in-turn": 0.0, "rudder-in-turn": 0.0}
+_NO_GAINS = dict.fromkeys(ADOPTED_GAINS, 0.0)
 _TEMPLATE = "inner_loop.xml.jinja"
 
 
@@ -122,7 +122,7 @@ def _airframe(a: Adoption, model: Original) -> Iterator[str]:
     yield f"throttle = {quoted(list(a.controls.throttles))}"
     yield from ("", "[adopted.trim]", *(f"{k} = {x:.6g}" for k, x in a.setting._asdict().items()))
     if a.gains:
-        loop = {"bandwidth": a.gains.bandwidth, "damping": a.gains.damping}
+        loop = {"bandwidth": a.gains.bandwidth, "lag": a.gains.lag, "damping": a.gains.damping}
         yield from ("", "[adopted.loop]", *(f"{k} = {x:.4g}" for k, x in loop.items()))
     for name, flight in a.flown.items():
         yield from ("", f"[adopted.flown.{name}]", *(f"{k} = {x:.4g}" for k, x in asdict(flight).items()))
@@ -143,8 +143,11 @@ def _sources(model: Original) -> Iterator[str]:
 def _derivatives(linear: Linear) -> Iterator[str]:
     for name in ("alpha", "beta", "rolling", "pitching", "yawing", "faster"):
         yield f"{name} = [{', '.join(f'{v:.4g}' for v in getattr(linear, name))}]"
-    for name in ("elevator", "aileron", "rudder", "throttle"):
+    for name in COMMANDS:
         yield f"{name} = [{', '.join(f'{v:.4g}' for v in getattr(linear, name).effect)}]"
+    yield from ("", "[adopted.growing] # what a command of 1, 3 and 8 times the size does about its axis, per command")
+    for name in COMMANDS:
+        yield f"{name} = [{', '.join(f'{v:.4g}' for v in getattr(linear, name).growing)}]"
 
 
 def _finite(value: float) -> str:
@@ -159,7 +162,7 @@ def motion(linear: Linear) -> dict[str, float]:
         "roll_time": linear.roll_time, "dutch_roll": dutch, "dutch_roll_damping": dutch_damping,
         "short_period": period, "short_period_damping": period_damping,
         "aileron_effect": float(linear.aileron.effect[3]), "aileron_hysteresis": linear.aileron.hysteresis,
-        **{f"{name}_lag": getattr(linear, name).lag for name in ("elevator", "aileron", "rudder", "throttle")},
+        **{f"{name}_lag": getattr(linear, name).lag for name in COMMANDS},
     }  # fmt: skip
 
 

@@ -19,8 +19,13 @@ Array = NDArray[np.float64]
 
 ZETA = 0.8
 LEAST_DAMPING = 0.28
+_GROWING = 0.02  # 1/s: what grows more slowly, guidance holds
 _STEP = math.radians(45.0)  # of the bank, that the whole aileron may answer
 _WOBBLE = math.radians(1.0)  # of the bank, that hysteresis may leave
+ADOPTED_GAINS = (  # beside those of the inner loop itself
+    "aileron-in-turn", "aileron-from-sideslip", "bank-i", "bank-model-per-s",
+    "rudder-in-turn", "rudder-from-roll-rate", "sideslip-i", "sideslip-limit",
+)  # fmt: skip
 _P, _Q, _R, _W, _U = 3, 4, 5, 2, 0
 
 
@@ -35,34 +40,30 @@ class LoopDesign:
     limited_by: str
     damping: float  # of the least damped oscillation of the linear loop
 
+    @property
+    def lag(self) -> float:
+        """How late the bank follows its command, s."""
+        return 2.0 * ZETA / self.bandwidth
+
 
 def designed(linear: Linear, trim: Mapping[str, float], stall: float, max_bank: float, wanted: float) -> LoopDesign:
     """The design for this aircraft; `wanted` in rad/s, angles in rad. Raises `RefusalError` where no loop is stable."""
     fastest, limited_by = _fastest(linear, trim, wanted)
-    for share in np.geomspace(1.0, 0.4, 8).tolist():
-        lateral = _lateral(linear, share * fastest)
-        eigenvalues = eigenvalues_of(_closed_lateral(linear, lateral))
-        damping = oscillation(eigenvalues)[1]
-        if damping >= LEAST_DAMPING and eigenvalues.real.max() < 0.02:
-            break
-    else:
-        if eigenvalues.real.max() > 0.02:
-            raise RefusalError("design", _why_unstable(linear, eigenvalues))
+    share, lateral, damping = _damped(linear, fastest)
     if share < 1.0:
         limited_by = f"damping of the yawing oscillation ({damping:.2f}), at {share * fastest:.2g} rad/s"
     for share_of_pitch in np.geomspace(1.0, 0.3, 8).tolist():
         pitching = _pitching(linear, trim, stall, max_bank, share_of_pitch)
         eigenvalues = eigenvalues_of(_closed_pitching(linear, pitching))
-        if oscillation(eigenvalues)[1] >= LEAST_DAMPING and eigenvalues.real.max() < 0.02:
+        if oscillation(eigenvalues)[1] >= LEAST_DAMPING and eigenvalues.real.max() < _GROWING:
             break
     else:
         if eigenvalues.real.max() > 0.05:
             raise RefusalError("design", f"pitch and altitude cannot be held: {eigenvalues.real.max():.2g} 1/s grows")
     bandwidth = share * fastest
-    follow = bandwidth / (2.0 * ZETA)
     gain = {
-        "rate-trim-per-s": 0.2 * follow,
-        "rate-trim-model-per-s": follow,
+        "rate-trim-per-s": 0.2 * bandwidth / (2.0 * ZETA),
+        "rate-trim-model-per-s": 1.0 / _turn_lag(linear, lateral, bandwidth),
         **lateral.gain,
         **pitching,
         **_speed(linear),
@@ -118,11 +119,15 @@ def _lateral(linear: Linear, omega: float) -> _Lateral:
         kp, kd = omega**2 / b, (2.0 * ZETA * omega - a) / b
     N_da, N_dr = float(linear.aileron.effect[_R]), float(linear.rudder.effect[_R])
     N_r, N_b = float(linear.yawing[_R]), float(linear.beta[_R])
-    L_r = float(linear.yawing[_P])
+    L_r, N_p = float(linear.yawing[_P]), float(linear.rolling[_R])
     rudder = {"rudder-from-aileron": 0.0, "rudder-from-yaw-rate": 0.0, "rudder-from-sideslip": 0.0}
     adopted = {
         "aileron-in-turn": _within(-L_r / b, 3.0),
+        "aileron-from-sideslip": _within(-float(linear.beta[_P]) / b, 4.0),  # the dihedral would hold the bank back
         "rudder-in-turn": 0.0,
+        "rudder-from-roll-rate": 0.0,
+        "bank-i": 0.15 * omega * kp,
+        "bank-model-per-s": omega / ZETA,
         "sideslip-i": 0.0,
         "sideslip-limit": 0.3,
     }
@@ -134,8 +139,24 @@ def _lateral(linear: Linear, omega: float) -> _Lateral:
         if N_b < 0.5:  # directionally weak or unstable: the rudder is the fin
             rudder["rudder-from-sideslip"] = (1.0 - N_b) / N_dr
         adopted["rudder-in-turn"] = _within(-N_r / N_dr, 5.0)
+        # In a turn's entry the yaw rate grows by g/V of the roll rate; without the rudder the nose stays behind.
+        adopted["rudder-from-roll-rate"] = _within((GRAVITY / linear.airspeed - N_p) / N_dr, 1.0)
         adopted["sideslip-i"] = 0.25 * max(N_b, 1.0 if N_b < 0.5 else 0.0) / N_dr
-    return _Lateral({"bank-p": kp, "bank-i": 0.15 * omega * kp, "roll-rate": kd, **rudder}, adopted)
+    return _Lateral({"bank-p": kp, "bank-i": 0.0, "roll-rate": kd, **rudder}, adopted)
+
+
+def _damped(linear: Linear, fastest: float) -> tuple[float, _Lateral, float]:
+    """The share of the bandwidth that leaves enough damping, or the most there is; gains and damping with it."""
+    tried = []
+    for share in np.geomspace(1.0, 0.4, 8).tolist():
+        lateral = _lateral(linear, share * fastest)
+        eigenvalues = eigenvalues_of(_closed_lateral(linear, lateral))
+        if eigenvalues.real.max() < _GROWING:
+            tried.append((share, lateral, oscillation(eigenvalues)[1]))
+    if not tried:
+        raise RefusalError("design", _why_unstable(linear, eigenvalues))
+    enough = min(LEAST_DAMPING, max(damping for *_, damping in tried) - 0.03)  # slower would be no better
+    return next(each for each in tried if each[-1] >= enough)
 
 
 def _within(value: float, limit: float) -> float:
@@ -149,9 +170,12 @@ def _closed_lateral(linear: Linear, gains: _Lateral) -> Array:
     closed = np.zeros((8, 8))
     closed[:4, :4], closed[:4, 4:6] = A, B
     aileron = np.zeros(8)
-    aileron[[1, 3, 6]] = -g["roll-rate"], -g["bank-p"], -g["bank-i"]
+    aileron[[1, 3]] = -g["roll-rate"], -g["bank-p"]
     rudder = g["rudder-from-aileron"] * aileron
+    aileron[0] = gains.adopted["aileron-from-sideslip"]
+    aileron[6] = -gains.adopted["bank-i"]
     rudder[0] += g["rudder-from-sideslip"]
+    rudder[1] += gains.adopted["rudder-from-roll-rate"]
     rudder[2] += g["rudder-from-yaw-rate"]
     rudder[3] -= g["rudder-from-yaw-rate"] * turn
     aileron[3] += gains.adopted["aileron-in-turn"] * turn
@@ -163,6 +187,30 @@ def _closed_lateral(linear: Linear, gains: _Lateral) -> Array:
         closed[row, row] -= rate
     closed[6, 3], closed[7, 0] = 1.0, 1.0
     return closed
+
+
+def _turn_lag(linear: Linear, gains: _Lateral, bandwidth: float) -> float:
+    """How late the yaw rate follows the command of the bank, s: the mean delay, for which the rate trim must wait.
+
+    At a large angle of attack the nose goes ahead of the course while the aircraft rolls in, and the lag is short.
+    """
+    bank_lag, g = 2.0 * ZETA / bandwidth, gains.gain
+    closed = _closed_lateral(linear, gains)
+    model = gains.adopted["bank-model-per-s"]
+    A, B, C = np.zeros((10, 10)), np.zeros(10), np.zeros(10)
+    A[:8, :8] = closed
+    A[6] = 0.0
+    A[6, [3, 9]] = 1.0, -1.0  # the integral of what the bank is beyond its model
+    A[8, 8], A[9, [8, 9]], B[8] = -model, (model, -model), model
+    aileron_rate, rudder_rate = (1.0 / max(surface.lag, 0.01) for surface in (linear.aileron, linear.rudder))
+    B[4] = aileron_rate * g["bank-p"]
+    B[5] = rudder_rate * g["rudder-from-aileron"] * g["bank-p"]
+    if not gains.adopted["sideslip-i"]:
+        A[7, 7] = -1.0
+    C[2] = 1.0
+    once = np.linalg.solve(A, B)
+    lag = -float(C @ np.linalg.solve(A, once)) / float(C @ once)
+    return min(max(lag, 0.2 * bank_lag), 2.0 * bank_lag)
 
 
 def _why_unstable(linear: Linear, eigenvalues: Eigenvalues) -> str:

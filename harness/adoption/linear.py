@@ -13,6 +13,7 @@ from harness.plants.wind_tunnel import WindTunnel
 Array = NDArray[np.float64]
 Eigenvalues = NDArray[np.complex128]
 
+COMMANDS = ("elevator", "aileron", "rudder", "throttle")
 _U, _V, _W, _P, _Q, _R = range(6)
 _ANGLE, _RATE, _SPEED, _COMMAND = math.radians(0.5), math.radians(1.0), 0.01, 0.05
 
@@ -23,6 +24,13 @@ class Surface(NamedTuple):
     effect: Array
     lag: float
     hysteresis: float
+    growing: tuple[float, ...]  # about its own axis, by commands of growing size
+
+    @property
+    def is_uneven(self) -> bool:
+        """Whether something stands between command and surface: what a command does depends on its size."""
+        sizes = [abs(effect) for effect in self.growing]
+        return max(sizes) > 2.0 * min(sizes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,9 +139,10 @@ def _surface(tunnel: WindTunnel, name: str, axis: int) -> Surface:
         with tunnel.changed(**{name: -size}):
             low = tunnel.at()
         slopes.append((high - low) / (2.0 * size))
-    small, _, large = (abs(float(slope[axis])) for slope in slopes)
+    growing = tuple(float(slope[axis]) for slope in slopes)
+    small, large = abs(growing[0]), abs(growing[-1])
     hidden = sizes[0] * (1.0 - small / large) if large > 0 and small < 0.7 * large else 0.0
-    return Surface(slopes[1] if not hidden else slopes[2], _lag(tunnel, name, axis, sizes[1]), hidden)
+    return Surface(slopes[1] if not hidden else slopes[2], _lag(tunnel, name, axis, sizes[1]), hidden, growing)
 
 
 def _lag(tunnel: WindTunnel, name: str, axis: int, size: float) -> float:

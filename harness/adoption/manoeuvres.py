@@ -43,7 +43,7 @@ class Turned:
     overshoot: float  # beyond 90 deg
     altitude: float  # largest error
     sideslip: float  # largest
-    rate: float  # heading rate over its command, in the middle of the turn
+    rate: float  # heading rate over its command of one lag before, in the middle of the turn; NaN where that is zero
 
     def faults(self, airspeed: float) -> list[str]:
         """What forbids to call it a change of course."""
@@ -70,24 +70,26 @@ def turned(folder: Path, start: Start, step: float, max_bank: float, lag: float)
     flying = SixDof(folder, step, rate_trim=True).start(replace(start, heading=0.0), Air())
     limit = rate_of_bank(start.airspeed, max_bank, COMMANDED_SHARE)
     gain = min(0.25 / lag, 0.5)  # 1/s, of the course error; lag is that of the bank's loop
-    states = []
+    states, commands = [], []
     aim = 0.5 * math.pi
     for i in range(round((aim / limit + 12.0 / gain + 10.0) / PERIOD)):
         rate = gain * wrap((aim if i * PERIOD > 2.0 else 0.0) - flying.state.heading)
+        commands.append(min(max(rate, -limit), limit))
         try:
-            flying.advance(min(max(rate, -limit), limit), PERIOD)
+            flying.advance(commands[-1], PERIOD)
         except End as end:
             raise RefusalError("90 deg", f"ended in {end.outcome} after {i * PERIOD:.1f} s: {end}") from None
         states.append(flying.state)
     column = _columns(states)
     course = np.unwrap(column["heading"])
-    turning = (course > math.radians(30.0)) & (course < math.radians(60.0))
+    turning = np.flatnonzero((course > math.radians(30.0)) & (course < math.radians(60.0)))
+    before = np.array(commands)[np.maximum(turning - round(lag / PERIOD), 0)].sum()
     return Turned(
         error=float(np.abs(course[-round(5.0 / PERIOD) :] - aim).max()),
         overshoot=max(0.0, float(course.max()) - aim),
         altitude=float(np.abs(column["altitude"] - start.altitude).max()),
         sideslip=float(np.abs(column["sideslip"] - column["sideslip"][0]).max()),
-        rate=float(np.mean(column["heading_rate"][turning])) / limit if turning.any() else math.nan,
+        rate=float(column["heading_rate"][turning].sum() / before) if before else math.nan,
     )
 
 

@@ -41,6 +41,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> No
 
     try:
         airframe = airframe_of(aircraft)
+        work = 0.0 if is_recorded(airframe) else job.work(airframe)
     except ValueError as error:
         raise BadInput(f"AIRCRAFT: {error}") from None
     if is_recorded(airframe):
@@ -57,7 +58,7 @@ def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> No
     except IdentifiedError:
         others = []  # a damaged file is written anew
     try:
-        with progress(f"identifying {airframe.name}", job.work(airframe), counted=False) as advance:
+        with progress(f"identifying {airframe.name}", work, counted=False) as advance:
             identification = job.identify(airframe, speed, done=advance)
     except PlantError as error:
         raise BadInput(f"--airspeed: {error}") from None

@@ -169,9 +169,7 @@ def _slower(airframe: Path) -> int:
 
 def _lag(airframe: Path) -> float:
     """About how late the aircraft follows, s."""
-    if not aircraft.adopted(airframe):
-        return _SMALL_LAG  # the committed fits of the harness's own airframes were made so
-    return 1.0 / float(aircraft.inner_loop(airframe)["gain"]["rate-trim-model-per-s"]["v"])
+    return aircraft.adopted_lag(airframe) or _SMALL_LAG  # of the harness's own: the committed fits were made so
 
 
 def _scale(airframe: Path, airspeed: float) -> float:

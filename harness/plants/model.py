@@ -88,6 +88,7 @@ def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> Fdm:
 
     Errors of the aircraft are in a copy of its model: JSBSim lets nobody set mass or lags of a loaded one.
     """
+    airframe = airframe.absolute()  # JSBSim takes a relative folder to be one of its own
     is_foreign = aircraft.adopted(airframe) is not None
     if not errors.of_aircraft:
         return _load(airframe, step, is_foreign)
