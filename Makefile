@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind fuzz adopt-all clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind fuzz adopt-all adopted clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -66,6 +66,10 @@ laws: install  ## fly every law in every air (ten minutes on two processors): do
 
 adopt-all: install  ## adopt every model that comes with JSBSim: docs/answers/adopted_models.md (ten minutes)
 	$(BIN)/python -m harness.studies.adopted_models
+
+adopted: install  ## the law on three adopted aircraft and our own: docs/answers/adopted_law.md (two minutes)
+	for name in c172p T38 dr1; do $(BIN)/harness adopt $$name --out out/adopted || exit 1; done
+	$(BIN)/python -m harness.studies.adopted_law experiments/adopted.toml
 
 bench: install  ## the speed of the loop, as ratios in one run, of the laws, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed

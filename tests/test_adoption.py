@@ -15,7 +15,8 @@ from harness.adoption.refusal import RefusalError
 from harness.plants.identified import identified, is_stale
 from harness.plants.model import data_root
 from harness.settings import load_flight
-from tests.builders import invoke, write
+from harness.studies.adopted_law import FACTORS, Aircraft, LastLap
+from tests.builders import EXPERIMENTS, HERE, fly_matrix, invoke, write
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +71,32 @@ def test_an_aircraft_of_an_earlier_adoption_that_lacks_its_lag_is_not_identified
     said = invoke("identify", folder, "--out", tmp_path / "plots")
     assert said.exit_code == 2
     assert "adopted.loop.lag must be a number above 0: run `harness adopt` again" in said.output
+
+
+def test_the_experiment_of_adopted_aircraft_flies_with_one_of_them_beside_the_three_of_the_harness(
+    adopted: tuple[str, Path], tmp_path: Path
+) -> None:
+    shutil.copytree(adopted[1], tmp_path / "out" / "adopted" / "c172p")
+    text = (EXPERIMENTS / "adopted.toml").read_text(encoding="utf-8")
+    there = [line for line in text.splitlines() if "adopted/T38" not in line and "adopted/dr1" not in line]
+    (tmp_path / "experiments").mkdir()
+    file = write(tmp_path / "experiments" / "adopted.toml", "\n".join(there))
+    progress = fly_matrix(file, tmp_path / "run", "guidance_period_s=0.5", "duration_s=2.0", options=HERE)
+    assert (progress.failed, progress.done) == (0, 16)
+
+
+def aircraft_whose_command_rests_up_to(factor: float) -> Aircraft:
+    quiet, loud = LastLap("", 0.0, 0.0, 0.0), LastLap("", math.radians(1.0), 0.2, 0.01)
+    ladder = [quiet if each <= factor else loud for each in FACTORS]
+    return Aircraft("one", 10.0, 100.0, 1.0, border=2.0, ladder=ladder, judged=[])
+
+
+def test_the_limit_cycle_begins_between_the_last_gain_that_rests_and_the_first_that_does_not() -> None:
+    assert aircraft_whose_command_rests_up_to(0.8).begins == (0.8, 0.9)
+    assert aircraft_whose_command_rests_up_to(0.8).mistold == [0.9]
+    assert aircraft_whose_command_rests_up_to(0.1).begins == (0.0, FACTORS[0])
+    assert aircraft_whose_command_rests_up_to(9.0).begins == (FACTORS[-1], math.inf)
+    assert aircraft_whose_command_rests_up_to(9.0).mistold == [1.1, 1.25, 1.5]
 
 
 def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tuple[str, Path]) -> None:

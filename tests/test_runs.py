@@ -407,7 +407,7 @@ def test_a_dry_run_tells_the_size_and_writes_nothing(file: Path, tmp_path: Path)
     assert checked.stdout.splitlines()[-1] == f"{file}: ok"
 
 
-SHIPPED = sorted(EXPERIMENTS.glob("*.toml"))
+SHIPPED = sorted(set(EXPERIMENTS.glob("*.toml")) - {EXPERIMENTS / "adopted.toml"})  # which needs adopted aircraft
 
 
 @pytest.mark.parametrize("experiment", SHIPPED, ids=[path.stem for path in SHIPPED])

@@ -16,10 +16,10 @@ from harness import tables
 from harness.adoption.adopt import adopt
 from harness.adoption.adoption import Wish
 from harness.adoption.refusal import RefusalError
-from harness.files import read, write_text
+from harness.files import make_folder, read
 from harness.markup import markdown
 from harness.plants.model import data_root
-from harness.studies.command import out_option, run
+from harness.studies.command import out_option, run, write
 
 _PAGE = "adopted_models.md"
 _HEADINGS = (
@@ -124,13 +124,13 @@ def _lines(results: list[Tried], flown: list[Tried], trimmed: list[Tried], power
 @click.option("--workers", type=click.IntRange(1, 64), default=2, show_default=True, help="Models at a time.")
 def main(out: Path, workers: int) -> None:
     """Adopt every model that comes with JSBSim, and write OUT/adopted_models.md: which fly, and why others do not."""
+    make_folder(out)
     with ThreadPoolExecutor(workers) as pool:
         results = []
         for result in pool.map(tried, models()):
             click.echo(f"{result.name}: {result.refused or 'adopted'}")
             results.append(result)
-    write_text(out / _PAGE, page(results))
-    click.echo(f"wrote {out / _PAGE}")
+    write(out, {_PAGE: page(results)})
 
 
 if __name__ == "__main__":
