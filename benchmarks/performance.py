@@ -8,10 +8,11 @@ import os
 import platform
 import statistics
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import jsbsim
@@ -21,11 +22,15 @@ import aircraft
 from autopilot.estimator import Estimator
 from autopilot.laws import law
 from benchmarks.flight_speed import bare_loop, seconds, spread
+from harness.adoption.adopt import adopt
+from harness.adoption.adoption import Wish
 from harness.files import write_text
 from harness.flight import Flight, air_of
 from harness.log import COLUMNS
 from harness.loop import simulate
+from harness.plants.model import Fdm
 from harness.plants.sixdof import SixDof
+from harness.settings import load_flight
 from harness.tables import markdown
 from harness.world.wind import Wind
 
@@ -71,6 +76,51 @@ def timed(flight: Flight, pairs: int) -> Timed:
     return found
 
 
+class Adopted(NamedTuple):
+    """Processor times of an adopted aircraft, s: of a flight, and of as many steps of bare JSBSim."""
+
+    name: str
+    flown: list[float]
+    looped: list[float]  # the model with its inner loop
+    model: list[float]  # the model with its inner loop off
+
+    def over(self, bare: Sequence[float]) -> str:
+        """Times the bare loop."""
+        return spread([f / b for f, b in zip(self.flown, bare, strict=True)])
+
+
+def adopted(name: str, pairs: int, duration: float) -> Adopted:
+    """Adopts a model that comes with JSBSim, and times its flight on the circle that suits it, without its start."""
+    with TemporaryDirectory(prefix="harness-") as folder:
+        for _ in adopt(name, Path(folder), Wish()):
+            pass
+        flight = replace(load_flight(Path(folder) / name / "circle.toml"), duration=duration)
+        plant = SixDof(aircraft.folder(flight.aircraft), flight.step, rate_trim=True)
+        found = Adopted(name, [], [], [])
+        for _ in range(pairs):
+            starting = seconds(partial(plant.start, flight.start, air_of(flight)))
+            found.flown.append(seconds(partial(simulate, flight)) - starting)
+            for times, engaged in ((found.looped, 1.0), (found.model, 0.0)):
+                fdm = plant.start(flight.start, air_of(flight)).fdm
+                fdm["inner-loop/engaged"] = fdm["actuators/engaged"] = engaged
+                times.append(seconds(partial(_run, fdm, round(duration / flight.step))))
+    return found
+
+
+def _run(fdm: Fdm, steps: int) -> None:
+    for _ in range(steps):
+        fdm.run()
+
+
+def page_of_adopted(found: Sequence[Adopted]) -> Iterator[str]:
+    """The section on adopted aircraft, in Markdown."""
+    yield "\n## Adopted aircraft\n"
+    yield "Models that come with JSBSim, by `harness adopt`, on the circle that suits them, 20 Hz, without the start."
+    yield "*With* and *without*: times as many steps of bare JSBSim with the inner loop running, and with it off.\n"
+    rows = [(each.name, each.over(each.looped), each.over(each.model), spread(each.flown)) for each in found]
+    yield from markdown(("model", "times with, 1.3 asked at most", "times without", "s"), rows, "lr")
+
+
 def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], starts: list[float]) -> Iterator[str]:
     """The page, in Markdown."""
     (plain, _), *_ = flights.values()
@@ -80,7 +130,7 @@ def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], 
     periods = plain.periods
     more_periods = round(plain.duration / 0.02) - periods
     yield "# What a flight costs"
-    yield "\n`make bench` measures it; `python -m benchmarks.performance` writes this page (a minute or two).\n"
+    yield "\n`make bench` measures it; `python -m benchmarks.performance` writes this page (a few minutes).\n"
     yield (
         f"Machine: {os.cpu_count()} processors, {platform.machine()}, Python {platform.python_version()}, "
         f"NumPy {np.__version__}, JSBSim {jsbsim.__version__}."
@@ -110,7 +160,9 @@ def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], 
     yield from markdown(("part", "µs"), [(name, f"{1e6 * value:.2f}") for name, value in parts], "lr")
 
 
-def main(pairs: int = 5, duration: float = 900.0, *, path: Path = PAGE) -> None:
+def main(
+    pairs: int = 5, duration: float = 900.0, *, path: Path = PAGE, models: Sequence[str] = ("c172p", "T38", "dr1")
+) -> None:
     """Measures, and writes the page."""
     flights = cases(duration)
     found = {}
@@ -120,7 +172,8 @@ def main(pairs: int = 5, duration: float = 900.0, *, path: Path = PAGE) -> None:
     (plain, _), *_ = flights.values()
     plant = SixDof(aircraft.folder(AIRFRAME), plain.step, rate_trim=True)
     starts = [seconds(partial(plant.start, plain.start, air_of(plain))) for _ in range(20)][1:]
-    write_text(path, "\n".join(page(flights, found, starts)) + "\n")
+    lines = [*page(flights, found, starts), *page_of_adopted([adopted(name, pairs, duration) for name in models])]
+    write_text(path, "\n".join(lines) + "\n")
     print(path)
 
 
