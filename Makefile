@@ -67,9 +67,10 @@ laws: install  ## fly every law in every air (ten minutes on two processors): do
 adopt-all: install  ## adopt every model that comes with JSBSim: docs/answers/adopted_models.md (ten minutes)
 	$(BIN)/python -m harness.studies.adopted_models
 
-adopted: install  ## the law on three adopted aircraft and our own: docs/answers/adopted_law.md (two minutes)
+adopted: install  ## the law on three adopted aircraft and our own: docs/answers/adopted_law.md, design_rule.md (three minutes)
 	for name in c172p T38 dr1; do $(BIN)/harness adopt $$name --out out/adopted || exit 1; done
 	$(BIN)/python -m harness.studies.adopted_law experiments/adopted.toml
+	$(BIN)/python -m harness.studies.design_rule
 
 bench: install  ## the speed of the loop, as ratios in one run, of the laws, of --help, of recordings
 	$(BIN)/python -m benchmarks.flight_speed

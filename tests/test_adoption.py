@@ -10,12 +10,13 @@ import pytest
 import aircraft
 from harness.adoption import adopt as adopting
 from harness.adoption.adoption import Adoption
-from harness.adoption.model import source
+from harness.adoption.model import named, source
 from harness.adoption.refusal import RefusalError
 from harness.plants.identified import identified, is_stale
 from harness.plants.model import data_root
 from harness.settings import load_flight
 from harness.studies.adopted_law import FACTORS, Aircraft, LastLap
+from harness.studies.design_rule import by_hand, open_loop, page
 from tests.builders import EXPERIMENTS, HERE, fly_matrix, invoke, write
 
 
@@ -97,6 +98,20 @@ def test_the_limit_cycle_begins_between_the_last_gain_that_rests_and_the_first_t
     assert aircraft_whose_command_rests_up_to(0.1).begins == (0.0, FACTORS[0])
     assert aircraft_whose_command_rests_up_to(9.0).begins == (FACTORS[-1], math.inf)
     assert aircraft_whose_command_rests_up_to(9.0).mistold == [1.1, 1.25, 1.5]
+
+
+@pytest.mark.parametrize("name", aircraft.names())
+def test_an_airframe_without_its_inner_loop_is_a_model_of_its_own(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / name
+    folder.mkdir()
+    model = source(str(write(folder / f"{name}.xml", open_loop(aircraft.folder(name)))))
+    assert not any(each.startswith(("inner-loop/", "actuators/")) for each in named(model.root))
+    assert "fcs/aileron-cmd-norm" in named(model.root)
+
+
+def test_gains_that_are_no_better_are_told_so() -> None:
+    hand = by_hand(aircraft.folder("ultra_stick_25e"))
+    assert "No: with the rule's gains 0 of 1 airframes follow sooner" in page([hand, hand._replace(made="by the rule")])
 
 
 def test_an_adopted_model_is_one_file_and_names_what_it_was_made_of(adopted: tuple[str, Path]) -> None:

@@ -35,13 +35,13 @@ Found = tuple[Adoption, str]
 _FILES = ("{name}.xml", "airframe.toml", "inner_loop.toml", "identified.toml", "circle.toml")
 
 
-def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
+def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterator[tuple[str, str]]:
     """Adopts the model `name` into the folder out/NAME; yields (stage, what it found). Raises `RefusalError`, OSError.
 
     Each stage runs in a process of its own. The folder is written when all stages are through; the last, which
     identifies the aircraft for the plants `lagged` and `coordinated`, may fail.
     """
-    end = time.monotonic() + SECONDS
+    end = time.monotonic() + seconds
     model = source(name)
     kept = out / model.name
     _check_place(kept, model)
@@ -62,7 +62,7 @@ def adopt(name: str, out: Path, wish: Wish) -> Iterator[tuple[str, str]]:
             try:
                 adoption, line = limited(stage, max(1.0, end - time.monotonic()), MEMORY, work, adoption)
             except ChildError as error:
-                late = f"not done after {SECONDS:g} s, which a model has for all stages"
+                late = f"not done after {seconds:g} s, which a model has for all stages"
                 refusal = RefusalError(stage, late if error.is_late else error.cause)
             except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
                 refusal = RefusalError(stage, " ".join(str(error).replace(f"{temporary}/", "").split()))
