@@ -94,8 +94,8 @@ def write_ulog(path: Path, topics: Mapping[str, Table], dropouts: Sequence[int] 
     return path
 
 
-_PACKED = {"Q": "Q", "c": "h", "C": "H", "B": "B", "f": "f", "e": "i"}
-_HUNDREDTHS = "cCe"
+_PACKED = {"Q": "Q", "c": "h", "C": "H", "B": "B", "f": "f", "e": "i", "L": "i"}
+_PARTS = {"c": 100, "C": 100, "e": 100, "L": 10_000_000}
 
 
 def write_dataflash(path: Path, messages: Mapping[str, tuple[str, Table]]) -> Path:
@@ -110,7 +110,7 @@ def write_dataflash(path: Path, messages: Mapping[str, tuple[str, Table]]) -> Pa
         out.append(described(kind, packed.size + 3, name, letters, ",".join(table)))
         for time, *values in zip(*table.values(), strict=True):
             whole = [
-                float(value) if letter == "f" else round(value * (100 if letter in _HUNDREDTHS else 1))
+                float(value) if letter == "f" else round(value * _PARTS.get(letter, 1))
                 for letter, value in zip(letters[1:], values, strict=True)
             ]
             rows.append((time, b"\xa3\x95" + bytes([kind]) + packed.pack(round(time * 1e6), *whole)))

@@ -105,6 +105,15 @@ def test_what_the_log_lacks_is_refused_without_a_number(gone: tuple[str, ...], p
     assert math.isnan(finding.value)
 
 
+def test_without_a_command_level_flight_can_hold_but_a_climb_is_no_failure_of_it() -> None:
+    flight = without(log(1).recorded(), "altitude_command", "altitude_error")
+    climbed = flight.changed(lambda altitude: 30.0 * np.sin(np.arange(len(altitude)) / 300.0), "altitude")
+    still = flight.changed(lambda altitude: 0.01 * np.sin(np.arange(len(altitude))), "altitude")
+    assert assess(still)[LEVEL].word == "holds"
+    assert assess(climbed)[LEVEL].word == CANNOT
+    assert math.isnan(assess(climbed)[LEVEL].value)
+
+
 def test_a_sideslip_of_an_estimated_wind_is_circular_and_one_of_a_vane_is_judged() -> None:
     flight = log(1).recorded()
     time = flight["bank"].time

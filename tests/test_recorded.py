@@ -251,6 +251,17 @@ def test_messages_that_nothing_describes_are_skipped_and_counted(tmp_path: Path)
     assert "23 bytes belong to no known message" in flight.problems[0]
 
 
+def test_without_a_filter_the_receiver_tells_the_position(tmp_path: Path) -> None:
+    fix = np.where(TIME < 1.0, 1.0, 3.0)
+    places = {"Lat": 60.0 + 1e-4 * TIME, "Lng": 180.0 - 2e-4 * TIME, "Alt": 50.0 + TIME}
+    gps = {"TimeUS": TIME, "Status": fix, **{name: np.where(fix < 3.0, 0.0, at) for name, at in places.items()}}
+    flight = read_log([write_dataflash(tmp_path / "a.bin", {**MESSAGES, "GPS": ("QBLLe", gps)})])
+    moved = [float(np.ptp(flight[name].values)) for name in ("north", "east", "altitude")]
+    seconds = TIME[-1] - 1.0
+    assert moved == pytest.approx([11.12 * seconds, 11.12 * seconds, seconds], rel=2e-3)
+    assert flight["north"].time[0] == pytest.approx(1.0)
+
+
 def test_a_damaged_time_does_not_make_a_log_a_year_long(tmp_path: Path) -> None:
     letters, _ = MESSAGES["ARSP"]
     rare = {"TimeUS": np.array([3e7]), "I": np.zeros(1), "Airspeed": np.array([17.0])}

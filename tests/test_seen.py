@@ -70,3 +70,4 @@ def test_a_flight_of_which_nothing_is_judged_has_a_page_and_a_recording_too(tmp_
     assert result.exit_code == 0, result.output
     assert "Nothing of it is judged" in files[1].read_text(encoding="utf-8")
     assert is_sealed(files[0])
+    assert "opens it as it is" in invoke("view", files[0], "--flight", "sixdof").stderr

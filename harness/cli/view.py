@@ -63,7 +63,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
     if logs is None and save is None:
         return _open(Path(what), port, web)
     if logs is None:
-        raise BadInput(f"{what}: is a recording already; choose some of its flights with --flight NAME")
+        raise BadInput(f"{what}: is a recording already; copy it, or choose some simulated flights with --flight NAME")
 
     from harness.review.recording import write_recording
 
@@ -148,6 +148,8 @@ def _of_file(path: Path, names: tuple[str, ...]) -> dict[str, FlightLog] | None:
     if not names:
         return None
     held = recorded(path)
+    if not held:
+        raise BadInput(f"{path}: holds no simulated flight; `harness view {path}` opens it as it is")
     for name in names:
         if name not in held:
             raise BadInput(f"{path}: holds no flight {name!r}; it holds {', '.join(held)}")

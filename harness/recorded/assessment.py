@@ -185,6 +185,7 @@ class _Made:
     sample: Sample
     reason: str = ""
     barred: str = ""  # why nothing may be decided by it
+    unless_it_holds: str = ""  # why it cannot be judged from what it deviates by; that it holds may still be said
 
 
 def _turn_relation(turning: "Turning | CannotJudgeError") -> _Made:
@@ -202,6 +203,9 @@ def _level(flight: RecordedFlight) -> _Made:
         commanded = flight.has("altitude_command")
         off = channel.values - (flight["altitude_command"].at(channel.time) if commanded else np.median(channel.values))
         about = "from the commanded altitude" if commanded else "from the flight's median: the log has no command"
+        if not commanded:
+            asked = "the altitude changes, and the log has no command: a climb that was asked for is no deviation"
+            return _Made(_windowed(channel.time, np.abs(off), np.max), about, unless_it_holds=asked)
     else:
         raise CannotJudgeError("the log has no altitude")
     return _Made(_windowed(channel.time, np.abs(off), np.max), about)
@@ -323,6 +327,9 @@ def _worded(made: "dict[str, _Made | CannotJudgeError]", limits: dict[str, float
             yield PartFinding(part, CANNOT, str(each))
             continue
         sample, bounds, word = each.sample, _bounds(part, limits), family[column]
+        if each.unless_it_holds and word is not Verdict.HOLDS:
+            yield PartFinding(part, CANNOT, each.unless_it_holds)
+            continue
         low, high = sample.interval() or (math.nan, math.nan)
         needed, reason = None, each.reason
         if each.barred:

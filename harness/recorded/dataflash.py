@@ -27,6 +27,8 @@ _LETTERS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "E": ("<u4", 0.01), "L": ("<i4", 1e-7), "M": ("u1", 1.0), "q": ("<i8", 1.0), "Q": ("<u8", 1.0),
     }
 )  # fmt: skip
+_FIX = 3  # the least GPS.Status of a position in three dimensions
+_EARTH = 6_371_000.0  # m, radius
 _DEGREES = ("d", "h", "D", "U", "k")  # units of FMTU that are degrees, or degrees a second
 
 
@@ -240,6 +242,8 @@ def _read(path: Path, content: mmap.mmap) -> RecordedFlight:
                 values, source = rows[wanted].astype(float) * to_si, f"{message.name}.{wanted}"
                 draft.add(name, time, values, message.basis, source, message.note)
     _add_velocity(draft)
+    if "GPS" in times and (layout := index.layout("GPS")):
+        _add_position(draft, layout, *times["GPS"])
     _add_events(draft, tables)
     return draft.finished()
 
@@ -306,6 +310,25 @@ def _add_velocity(draft: Draft) -> None:
     v, chi = speed.values, course.at(speed.time)
     draft.add("velocity_north", speed.time, v * np.cos(chi), Basis.DERIVED, "GPS.Spd, GPS.GCrs")
     draft.add("velocity_east", speed.time, v * np.sin(chi), Basis.DERIVED, "GPS.Spd, GPS.GCrs")
+
+
+def _add_position(draft: Draft, layout: Layout, time: Array, rows: NDArray[np.void]) -> None:
+    """Without a filter's position, that of the receiver, from its first fix on a sphere."""
+    if {"north", "east"} & set(draft.channels) or not {"Status", "Lat", "Lng", "Alt"} <= set(layout.fields):
+        return
+    fixed = rows["Status"] >= _FIX
+    time, rows = time[fixed], rows[fixed]
+    if not len(time):
+        return
+
+    def number(name: str) -> Array:
+        return rows[name].astype(float) * _LETTERS[layout.letters[layout.fields.index(name)]][1]
+
+    latitude, longitude = np.radians(number("Lat")), np.radians(number("Lng"))
+    east = np.unwrap(longitude - longitude[0]) * np.cos(latitude[0])
+    draft.add("north", time, _EARTH * (latitude - latitude[0]), Basis.MEASURED, "GPS.Lat")
+    draft.add("east", time, _EARTH * east, Basis.MEASURED, "GPS.Lng")
+    draft.add("altitude", time, number("Alt") - number("Alt")[0], Basis.MEASURED, "GPS.Alt")
 
 
 def _add_events(draft: Draft, tables: Mapping[str, NDArray[np.void]]) -> None:
