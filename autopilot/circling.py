@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from autopilot.guidance import LawStep, Observation
 from autopilot.rules import Known, rounded
-from autopilot.standoff import Answer, StandoffLaw, limited_step
+from autopilot.standoff import STANDING, Answer, StandoffLaw, limited_step
 
 MARGIN = 1.5  # PX4's NPFG_PERIOD_SF: what the period is longer than the least stable one
 _CLOSEST = 1e-6  # m: as in `standoff.relative_motion`
@@ -52,7 +52,8 @@ def circling(o: Observation, R_d: float, v_a: float, psi_a: float) -> Circling:
     v_along, v_out = v_a * cos(bar_psi_a) + w_along, v_a * sin(bar_psi_a) + w_out
     a_along = a_out = 0.0
     if a_t or omega_t:
-        faster = a_t / (hypot(v_t_x, v_t_y) or 1.0)
+        v_t = hypot(v_t_x, v_t_y)
+        faster = a_t / v_t if v_t > STANDING else 0.0
         a_x, a_y = omega_t * v_t_y - faster * v_t_x, -omega_t * v_t_x - faster * v_t_y
         a_along, a_out = a_x * cos_lam + a_y * sin_lam, a_y * cos_lam - a_x * sin_lam
     lam_dot = -v_along / (L if L > _CLOSEST else _CLOSEST)

@@ -18,6 +18,7 @@ from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
 PAPER_STANDOFF, PAPER_AIRSPEED = 200.0, 13.0  # m, m/s: of the circle and the aircraft of Table 1
 _CLOSEST = 1e-6  # m: at a smaller distance the azimuth has no meaning; it also bounds the rate of the azimuth
+STANDING = 1e-9  # m/s: a slower target has no direction along which it could accelerate
 
 
 Motion = tuple[
@@ -63,7 +64,7 @@ def feed_forward_ahead(o: Observation, motion: Motion, R_d: float, v_a: float, p
     cos_turned, sin_turned = cos(turned), sin(turned)
     if a_t or omega_t:
         v_t = hypot(v_t_x, v_t_y)
-        faster = max(0.0, 1.0 + a_t * time / v_t) if v_t else 1.0
+        faster = max(0.0, 1.0 + a_t * time / v_t) if v_t > STANDING else 1.0
         cos_t, sin_t = faster * cos(omega_t * time), faster * sin(omega_t * time)
         v_t_x, v_t_y = v_t_x * cos_t - v_t_y * sin_t, v_t_x * sin_t + v_t_y * cos_t
     x, y = x_t + x_r * cos_turned - y_r * sin_turned, y_t + x_r * sin_turned + y_r * cos_turned
@@ -91,6 +92,7 @@ def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> flo
 
 
 _SLOWEST = 1e-3  # m/s: no airspeed that a law computes with is smaller
+_STANDS_STILL = 1.0 - 1e-6  # wind over airspeed: from here on the aircraft may stand still, where Eq. (3) has no value
 AIRSPEEDS: Mapping[str, Callable[[Observation], float]] = MappingProxyType(  # the v_a of a law, by its setting
     {
         "nominal": lambda o: o.nominal_airspeed,
@@ -155,7 +157,7 @@ def limited_step(
         if by_course:
             W_x, W_y = o.wind_north, o.wind_east
             psi_a = heading_from_course(v_a, atan2(o.velocity_east, o.velocity_north), W_x, W_y)
-            if hypot(W_x, W_y) < v_a:
+            if hypot(W_x, W_y) < _STANDS_STILL * v_a:
                 limit = max_rate / course_rate_ratio(v_a, psi_a, W_x, W_y)  # |u_chi| <= max_rate, Eq. (3)
         r, s, heading_error, feed_forward, rest = answer(o, v_a, psi_a)
         unlimited = feed_forward + rest

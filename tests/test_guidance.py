@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from autopilot import nftsm
 from autopilot.angles import wrap
-from autopilot.guidance import UNKNOWN, Guidance, Law, Observation
+from autopilot.guidance import UNKNOWN, Context, Guidance, Law, Observation
 from autopilot.laws import LAWS, law
+from autopilot.response import plain
 from autopilot.standoff import AIRSPEEDS, course_rate_ratio, ground_speed, heading_from_course, relative_motion
 
 V_A, R_D = 13.0, 200.0
@@ -165,6 +166,23 @@ def test_every_answer_is_finite_for_every_finite_observation(
     assert all(math.isfinite(number) for number in answer)
     if command == "heading_rate":
         assert abs(answer.heading_rate) <= steering.max_heading_rate
+
+
+@pytest.mark.parametrize("speed", [0.0, 5e-324, 3e-306, 1e-12])
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_a_target_that_speeds_up_from_rest_leaves_every_answer_finite(name: str, speed: float) -> None:
+    o = moment(0.0)._replace(target_velocity_north=0.0, target_velocity_east=speed, target_acceleration=1e3)
+    step = law(name).start(Context(0.05, V_A, response=plain(0.1, 5.0, 0.7)))
+    assert all(math.isfinite(number) for _ in range(3) for number in step(o))
+
+
+@pytest.mark.parametrize("drift", [0.0, 5e-324, 2e-5, 1e-3])
+@pytest.mark.parametrize("wind", [1e-3, 13.0, 1440.0])
+def test_an_aircraft_that_the_wind_holds_in_place_is_answered(wind: float, drift: float) -> None:
+    steering = law("nftsm", airspeed="ground", command="course_rate")
+    o = moment(0.0)._replace(wind_north=0.0, wind_east=-wind, velocity_north=0.0, velocity_east=drift)
+    answer = fly_at(o, steering)
+    assert all(math.isfinite(number) for number in answer)
 
 
 @pytest.mark.parametrize("direction", ["paper", "mirrored"])
