@@ -9,6 +9,7 @@ from benchmarks import (
     compiled,
     flight_speed,
     help_speed,
+    long_logs,
     maps,
     performance,
     planted_failures,
@@ -109,3 +110,10 @@ def test_the_page_of_what_a_flight_costs_has_every_case_and_part(
     (step,) = re.findall(r"JSBSim, a step of 5 ms \| ([\d.]+) \|", text)
     assert float(step) > 0.0
     assert len(lines(capsys)) == len(performance.cases(20.0)) + 1
+
+
+def test_a_long_log_of_each_format_is_read(capsys: pytest.CaptureFixture[str]) -> None:
+    long_logs.main([2.0])
+    _, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines(capsys)]
+    assert [row[:2] for row in rows] == [[kind, "2"] for kind in long_logs.WRITERS]
+    assert all(float(minutes) > 1.0 and float(memory) > 50.0 for _, _, minutes, memory, _ in rows)

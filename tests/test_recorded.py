@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from harness.recorded import thinning
 from harness.recorded.assessment import assess
 from harness.recorded.column_map import read_map, shipped
 from harness.recorded.contents import contents
@@ -190,6 +191,20 @@ def test_rows_that_come_faster_than_is_needed_are_averaged(tmp_path: Path) -> No
     assert flight["bank"].rate == pytest.approx(100.0, rel=0.01)
     assert flight["bank"].rows == 8000
     assert flight["bank"].at(np.array([1.0])) == pytest.approx(0.4 * np.sin(1.0), abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["ulog", "dataflash", "csv"])
+def test_of_a_long_log_one_row_in_a_few_is_read_which_is_said(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, *map_ = logs(tmp_path)[kind]
+    monkeypatch.setattr(thinning, "MOST", len(TIME) // 5)
+    flight = read_log([Path(str(log))], str(map_[1]) if map_ else None)
+    assert len(TIME) // 10 <= flight["bank"].rows <= 2 * (len(TIME) // 5)
+    assert any(f"is read of its {len(TIME)}, to bound the memory" in problem for problem in flight.problems)
+    time = flight["bank"].time
+    at = np.searchsorted(TIME, time - 1e-3)
+    assert flight["bank"].values == pytest.approx(BANK[at], abs=6e-4)
 
 
 def test_a_file_that_is_no_log_is_one_line(tmp_path: Path) -> None:

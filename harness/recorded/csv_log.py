@@ -11,6 +11,7 @@ from pandas.errors import EmptyDataError, ParserError
 from harness.recorded.column_map import ColumnMap, FileMap, read_map, shipped
 from harness.recorded.draft import Draft
 from harness.recorded.recorded_flight import Array, LogError, LoggedEvent, RecordedFlight
+from harness.recorded.thinning import every, said
 
 _ROWS = 50_000  # at once
 _LONGEST_HEADER = 1_000_000  # characters
@@ -86,8 +87,12 @@ def _read_file(draft: Draft, path: Path, part: FileMap, header: Sequence[str], c
             f"{path}:1: has no column {missing[0]!r}, which the map {chosen.name} asks for; "
             f"its columns are {', '.join(header)[:300]}"
         )
-    table, ragged = _table(path, part.columns, header)
-    if ragged:
+    lines = _lines(path) - 1
+    step = every(lines)
+    table, rows_read = _table(path, part.columns, header, step)
+    if step > 1:
+        draft.problems.append(said(path.name, lines, step))
+    if ragged := max(0, lines - rows_read):
         draft.problems.append(f"{path.name}: {ragged} rows have more cells than the header, and are left out")
     time = table[part.clock.column] * part.clock.unit + part.clock.offset
     rows = draft.in_order(time, path.name)
@@ -100,21 +105,22 @@ def _read_file(draft: Draft, path: Path, part: FileMap, header: Sequence[str], c
             draft.failure = LoggedEvent(float(time[rows][failed[0]]), path.stem.rpartition("failure_status-")[2])
 
 
-def _table(path: Path, columns: Sequence[str], header: Sequence[str]) -> tuple[dict[str, Array], int]:
-    """These columns as numbers, NaN for what is none; and how many rows were left out."""
+def _table(path: Path, columns: Sequence[str], header: Sequence[str], step: int) -> tuple[dict[str, Array], int]:
+    """These columns as numbers, of one row in `step`, NaN for what is none; and how many rows there are."""
     pieces: dict[str, list[Array]] = {column: [] for column in columns}
     rows = 0
     try:
         for piece in _pieces(path, columns, header):
+            kept = piece[-rows % step :: step]
             rows += len(piece)
             for column in columns:
-                numbers = pd.to_numeric(piece[column], errors="coerce").to_numpy(dtype=float)
+                numbers = pd.to_numeric(kept[column], errors="coerce").to_numpy(dtype=float)
                 pieces[column].append(np.where(np.isfinite(numbers), numbers, np.nan))
     except (ParserError, EmptyDataError, UnicodeDecodeError, ValueError, OverflowError) as error:
         raise LogError(f"{path}: cannot be read as CSV: {' '.join(str(error).split())}") from None
     if not rows:
         raise LogError(f"{path}: has a header and no rows")
-    return {column: np.concatenate(pieces.pop(column)) for column in columns}, max(0, _lines(path) - 1 - rows)
+    return {column: np.concatenate(pieces.pop(column)) for column in columns}, rows
 
 
 def _pieces(path: Path, columns: Sequence[str], header: Sequence[str]) -> Iterator[pd.DataFrame]:

@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.recorded import thinning
 from harness.recorded.draft import Draft
 from harness.recorded.recorded_flight import Array, Basis, LogError, LoggedEvent, RecordedFlight
 
 MAGIC = b"\xa3\x95"  # before every message; the type follows
 _FMT = 128  # the type of the message that describes another
 _FMT_LENGTH = 89
+_PIECE = 1 << 24  # bytes: so much of the mapped file is in memory at once
 
 # Each letter of a format: NumPy's type, and the factor by which its whole numbers are multiplied.
 _LETTERS: Mapping[str, tuple[str, float]] = MappingProxyType(
@@ -139,20 +141,49 @@ class Layout(NamedTuple):
         kind = np.dtype([(name, _LETTERS[letter][0]) for name, letter in zip(self.fields, self.letters, strict=True)])
         return kind if kind.itemsize == self.length - 3 else None
 
+    @property
+    def instance(self) -> int:
+        """Where in the message the number of the sensor, or filter, is; 0 without one."""
+        places = self.dtype.fields if self.dtype else None
+        for name in ("I", "C", "Instance"):
+            if places and name in places and places[name][0].itemsize == 1:
+                return 3 + places[name][1]
+        return 0
+
+
+class _Offsets:
+    """Where the messages of one kind are, of its first sensor: all of them, of more than `2 MOST` every second, …"""
+
+    def __init__(self, instance: int) -> None:
+        self.instance, self.number = instance, 256
+        self.seen, self.step, self.at = 0, 1, array("q")
+
+    def add(self, content: mmap.mmap, at: int) -> None:
+        if self.instance and (number := content[at + self.instance]) != self.number:
+            if number > self.number:
+                return
+            self.number, self.seen, self.step, self.at = number, 0, 1, array("q")
+        if self.seen % self.step == 0:
+            self.at.append(at)
+        self.seen += 1
+        if len(self.at) >= 2 * thinning.MOST:
+            del self.at[1::2]
+            self.step *= 2
+
 
 class _Index:
     """Where the messages of a file are: the layouts, and the offset of each message that is wanted."""
 
     def __init__(self, content: mmap.mmap) -> None:
         self.layouts: dict[int, Layout] = {_FMT: Layout("FMT", _FMT_LENGTH, "BBnNZ", ())}
-        self.offsets: dict[str, array[int]] = {}
+        self.offsets: dict[str, _Offsets] = {}
         self.skipped, self.cut, self.conflicts = 0, 0, 0
         self._scan(content)
 
     def _scan(self, content: mmap.mmap) -> None:
-        at, size = 0, len(content)
+        at, size, released = 0, len(content), _PIECE
         lengths = [0] * 256
-        wanted: list[array[int] | None] = [None] * 256
+        wanted: list[_Offsets | None] = [None] * 256
         lengths[_FMT] = _FMT_LENGTH
         while at + 3 <= size:
             if content[at] != 0xA3 or content[at + 1] != 0x95 or not lengths[content[at + 2]]:
@@ -160,6 +191,9 @@ class _Index:
                 self.skipped += (begin if begin >= 0 else size) - at
                 at = begin if begin >= 0 else size
                 continue
+            if at > released:
+                content.madvise(mmap.MADV_DONTNEED)
+                released = at + _PIECE
             kind = content[at + 2]
             if at + lengths[kind] > size:
                 self.cut = size - at
@@ -173,10 +207,10 @@ class _Index:
                     self.layouts[described] = layout
                     lengths[described] = layout.length
                     if layout.name in _WANTED and layout.dtype is not None:
-                        wanted[described] = self.offsets.setdefault(layout.name, array("Q"))
+                        wanted[described] = self.offsets.setdefault(layout.name, _Offsets(layout.instance))
             offsets = wanted[kind]
             if offsets is not None:
-                offsets.append(at)
+                offsets.add(content, at)
             at += lengths[kind]
 
     def layout(self, name: str) -> Layout | None:
@@ -221,13 +255,16 @@ def _read(path: Path, content: mmap.mmap) -> RecordedFlight:
     tables = {
         name: table
         for name in index.offsets
-        if (layout := index.layout(name)) and (table := _table(content, index.offsets[name], layout)) is not None
+        if (layout := index.layout(name)) and (table := _table(content, index.offsets[name].at, layout)) is not None
     }
+    for name, offsets in index.offsets.items():
+        if offsets.step > 1:
+            draft.problems.append(thinning.said(f"{path.name}: {name}", offsets.seen, offsets.step))
     units, factors = _units(tables, index.layouts)
     times: dict[str, tuple[Array, NDArray[np.void]]] = {}
     for message in MESSAGES:
         if message.name in tables and message.name not in times:
-            times[message.name] = _first_instance(draft, path, message.name, tables[message.name])
+            times[message.name] = _in_order(draft, path, message.name, tables[message.name])
         layout = index.layout(message.name)
         if message.name in times and layout:
             time, rows = times[message.name]
@@ -255,9 +292,10 @@ def _table(content: mmap.mmap, offsets: "array[int]", layout: Layout) -> NDArray
         return None
     raw = np.frombuffer(content, np.uint8)
     rows = np.empty(len(offsets), kind)
-    body, begins = rows.view(np.uint8).reshape(len(offsets), -1), np.frombuffer(offsets, np.uint64).astype(np.int64)
+    body, begins = rows.view(np.uint8).reshape(len(offsets), -1), np.frombuffer(offsets, np.int64)
     for k in range(0, len(offsets), 10_000):
         body[k : k + 10_000] = raw[begins[k : k + 10_000, None] + 3 + np.arange(layout.length - 3)]
+        content.madvise(mmap.MADV_DONTNEED)
     del raw  # else the file could not be unmapped
     return rows
 
@@ -286,12 +324,8 @@ def _rounded(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-def _first_instance(draft: Draft, path: Path, name: str, rows: NDArray[np.void]) -> tuple[Array, NDArray[np.void]]:
-    """The rows of the first sensor, or filter, of this message, in the order of their times, s."""
-    for instance in ("I", "C", "Instance"):
-        if instance in (rows.dtype.names or ()):
-            rows = rows[rows[instance] == rows[instance].min()]
-            break
+def _in_order(draft: Draft, path: Path, name: str, rows: NDArray[np.void]) -> tuple[Array, NDArray[np.void]]:
+    """The rows of this message in the order of their times, s."""
     fields = rows.dtype.names or ()
     clock, second = ("TimeUS", 1e-6) if "TimeUS" in fields else ("TimeMS", 1e-3)
     if clock not in fields:

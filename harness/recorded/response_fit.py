@@ -20,7 +20,8 @@ from harness.verdict.statistics import Sample
 Array = NDArray[np.float64]
 
 BLOCKS = 20
-_GRID = 0.02  # s
+_GRID = 0.02  # s: the step of the response, unless that makes more than so many
+_MOST_STEPS = 500_000
 _TRANSIENT = 4.0  # s, at the beginning: what was commanded before the log is not known
 _LOWEST = (-0.5, math.log(1.0), math.log(0.3), 0.2, -0.5)
 _HIGHEST = (3.0, math.log(40.0), math.log(4.0), 3.0, 0.5)
@@ -76,14 +77,15 @@ def fitted(command: Channel, response: Channel) -> ResponseFit | None:
     if end - begin < 30.0 or len(time) < 4 * BLOCKS:
         return None
     held = 0.5 * command.interval  # a command is seen half an interval late, on average
-    grid = np.arange(begin, end + _GRID, _GRID)
+    step = max(_GRID, (end - begin) / _MOST_STEPS)
+    grid = np.arange(begin, end + step, step)
     u = command.at(np.minimum(grid + held, command.time[-1]))
     u = np.where(np.isfinite(u), u, 0.0)
     noise = _FIRM * float(np.std(np.diff(y))) / 10.0
 
     def off(x: Array) -> Array:
         delay, frequency, damping, gain, zero = x
-        follows = np.interp(time - delay, grid, _second_order(u, math.exp(frequency), math.exp(damping)))
+        follows = np.interp(time - delay, grid, _second_order(u, step, math.exp(frequency), math.exp(damping)))
         usual = noise * (x[:3] - _USUAL) / _SPREAD
         return np.concatenate([zero + gain * follows - y, usual])
 
@@ -98,7 +100,7 @@ def fitted(command: Channel, response: Channel) -> ResponseFit | None:
     explained = [1.0 - 2.0 * each.cost / variation for each in found]
     first = next(i for i, share in enumerate(explained) if share >= AS_WELL * max(explained) or share == max(explained))
     x, J, r = found[first].x, np.asarray(found[first].jac, dtype=np.float64), found[first].fun
-    changes = np.diff(u[:: max(1, round(max(response.interval, 0.25) / _GRID))])
+    changes = np.diff(u[:: max(1, round(max(response.interval, 0.25) / step))])
     return ResponseFit(
         delay=float(x[0]), frequency=math.exp(x[1]), damping=math.exp(x[2]), gain=float(x[3]),
         explained=explained[first], interval=response.interval, held=held,
@@ -126,13 +128,13 @@ def _numbers(x: Array) -> Array:
     return np.array([x[0], frequency, damping, x[3], x[0] + 2.0 * damping / frequency])
 
 
-def _second_order(u: Array, frequency: float, damping: float) -> Array:
-    """The output on the grid of a second order whose input is held between the grid's points; begun at rest at u[0]."""
+def _second_order(u: Array, step: float, frequency: float, damping: float) -> Array:
+    """The output, each `step` s, of a second order whose input is held from one to the next; begun at rest at u[0]."""
     w, z = frequency, damping
     system = np.array([[0.0, 1.0, 0.0], [-w * w, -2.0 * z * w, w * w], [0.0, 0.0, 0.0]])
-    step = expm(system * _GRID)
-    (a, b), (c, d) = step[:2, :2]
-    g, k = step[:2, 2]
+    over = expm(system * step)
+    (a, b), (c, d) = over[:2, :2]
+    g, k = over[:2, 2]
     # y over u, from z y = a y + b v + g u, z v = c y + d v + k u
     out = lfilter([0.0, g, b * k - d * g], [1.0, -(a + d), a * d - b * c], u - u[0])
     followed: Array = np.asarray(out) + u[0]

@@ -5,7 +5,7 @@ intervals know of each other.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -24,6 +24,7 @@ STOPPED = 1.0  # m/s: an airspeed sensor that shows less in flight shows nothing
 LEAST_TRACK = 20  # values of the ground velocity
 LEAST_IN_WINDOW = 6  # of them, in a window of turning flight
 WIND_MOVED = 2.0  # m/s, from the beginning to the end of a flight
+MOST_PARTS = 100  # of a flight, that are left out in turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,23 +132,28 @@ def _has_settled(track: GroundTrack) -> None:
 
 
 def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fixed: Fit | None) -> Turning:
-    """The relation with all that it rests on, and the same without each window and the flight around it."""
+    """The relation with all that it rests on, and the same without each window and the flight around it.
+
+    Of more than `MOST_PARTS` windows, neighbours are left out together, so that a long flight takes no long time.
+    """
     right = sum(window.is_right for window in windows)
     bank_error = min(right, len(windows) - right) >= 2
     of = turn.integrals(bank, bank.time[0], bank.time[-1])
     whole = fixed or air.fitted(track)
     age = turn.age_of(track, of, whole, windows, bank_error=bank_error)
     edges = [-math.inf, *(0.5 * (a.end + b.begin) for a, b in pairwise(windows)), math.inf]
-    block = np.searchsorted(edges, track.time, side="right") - 1
+    n = min(len(windows), MOST_PARTS)
+    part = np.arange(len(windows)) * n // len(windows)
+    part_of_row = part[np.searchsorted(edges, track.time, side="right") - 1]
 
     def numbers(wind: Fit, at: Sequence[TurnWindow]) -> list[float]:
         slope = turn.relation(track, of, wind, at, age, bank_error=bank_error)[0].slope
         return [slope, *wind]
 
-    n = len(windows)
     value = np.array(numbers(whole, windows))
     without = [
-        numbers(fixed or air.fitted(track, block != k), [w for i, w in enumerate(windows) if i != k]) for k in range(n)
+        numbers(fixed or air.fitted(track, part_of_row != k), [windows[i] for i in np.flatnonzero(part != k)])
+        for k in range(n)
     ]
     pseudo = n * value - (n - 1) * np.array(without)
     samples = [Sample(column, n, drawn=True) for column in pseudo.T]
@@ -155,19 +161,19 @@ def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fi
     _, north, east, scale = with_interval
     wind = SteadyWind(north, east, None if fixed else scale, "autopilot" if fixed else "track")
     barred = "" if fixed is None else "the wind is the autopilot's, whose error the interval does not hold"
-    points = tuple(_point(track, of, whole, window) for window in windows)
+    points = tuple(_points(track, of, whole, windows))
     return Turning(samples[0], barred, wind, None, points, age)
 
 
-def _point(track: GroundTrack, of: turn.Integrals, wind: Fit, window: TurnWindow) -> TurnPoint:
-    """Mean turn rates of a window."""
+def _points(track: GroundTrack, of: turn.Integrals, wind: Fit, windows: Sequence[TurnWindow]) -> Iterator[TurnPoint]:
+    """Mean turn rates of each window."""
     north, east = track.north - wind.north, track.east - wind.east
-    at = np.array([window.begin, window.end])
-    angle = np.interp(at, track.time, np.unwrap(np.arctan2(east, north)))
-    inside = (of.time >= window.begin) & (of.time <= window.end)
-    speed = np.interp(of.time[inside], track.time, np.hypot(north, east))
-    asked = float(np.mean(GRAVITY * of.tangent[inside] / speed))
-    return TurnPoint(window.begin, window.end, asked, float(angle[1] - angle[0]) / (window.end - window.begin))
+    angle, speed = np.unwrap(np.arctan2(east, north)), np.hypot(north, east)
+    for window in windows:
+        begin, end = np.interp([window.begin, window.end], track.time, angle).tolist()
+        inside = slice(*np.searchsorted(of.time, [window.begin, window.end]).tolist())
+        asked = GRAVITY * of.tangent[inside] / np.interp(of.time[inside], track.time, speed)
+        yield TurnPoint(window.begin, window.end, float(asked.mean()), (end - begin) / (window.end - window.begin))
 
 
 def _say(notes: list[str], turning: Turning, estimate: Estimated | None, steep: Sequence[TurnWindow]) -> None:

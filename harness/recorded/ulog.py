@@ -2,16 +2,17 @@
 
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
+from harness.recorded import thinning
 from harness.recorded.draft import Draft
 from harness.recorded.frames import bank_pitch_yaw
 from harness.recorded.recorded_flight import Array, Basis, LogError, LoggedEvent, RecordedFlight
@@ -125,13 +126,42 @@ class _Bounded:
         return content
 
 
+class _Rows(bytearray):
+    """The rows of a topic: all of them, of more than `2 MOST` every second, and so on."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.size, self.seen, self.step = size, 0, 1
+
+    def __iadd__(self, row: Any) -> Self:  # type: ignore[misc]  # as of bytearray itself
+        if self.seen % self.step == 0:
+            self.extend(row)
+        self.seen += 1
+        if len(self) >= 2 * thinning.MOST * self.size:
+            self[:] = np.frombuffer(bytes(self), np.dtype((np.void, self.size)))[::2].tobytes()
+            self.step *= 2
+        return self
+
+
+def _parsed(file: _Bounded, names: Sequence[str]) -> tuple[Any, Mapping[int, _Rows]]:
+    """The log of pyulog, which has all rows of a topic in one `_Rows`, by the topic's number."""
+    rows: dict[int, _Rows] = {}
+
+    def topic(*described: Any) -> Any:
+        made = ULog._MessageAddLogged(*described)
+        made.buffer = rows[made.msg_id] = _Rows(made.dtype.itemsize)
+        return made
+
+    return type("Log", (ULog,), {"_MessageAddLogged": staticmethod(topic)})(file, names), rows
+
+
 def read_ulog(path: Path) -> RecordedFlight:
     """The flight of a ULog file. Raises `LogError`, and OSError."""
     names = [*{topic.name for topic in TOPICS}, _STATUS, _LAND]
     file = _Bounded(path)
     try:
         with redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            log = ULog(file, names)
+            log, rows_of = _parsed(file, names)
     except Exception as error:  # a damaged file makes pyulog raise almost anything
         raise LogError(f"{path}: is no readable ULog: {' '.join(str(error).split()) or type(error).__name__}") from None
     finally:
@@ -148,6 +178,8 @@ def read_ulog(path: Path) -> RecordedFlight:
             time = one.data["timestamp"].astype(float) * 1e-6
             rows = draft.in_order(time, f"{path.name}: {one.name}")
             data[one.name] = time[rows], _Ordered(one.data, rows)
+            if (read := rows_of[one.msg_id]).step > 1:
+                draft.problems.append(thinning.said(f"{path.name}: {one.name}", read.seen, read.step))
     for topic in TOPICS:
         if topic.name in data:
             _add(draft, topic, *data[topic.name])
