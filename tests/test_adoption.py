@@ -9,7 +9,7 @@ import pytest
 
 import aircraft
 from harness.adoption import adopt as adopting
-from harness.adoption.adoption import Adoption
+from harness.adoption.adoption import Adoption, Wish
 from harness.adoption.model import named, source
 from harness.adoption.refusal import RefusalError
 from harness.plants.identified import identified, is_stale
@@ -178,6 +178,15 @@ def test_a_model_that_cannot_fly_is_refused_with_its_cause_and_leaves_no_folder(
     assert said.exit_code == 1
     assert f"not adopted: {stage}: {cause}" in said.output
     assert not (tmp_path / "out" / model).exists()
+
+
+def found_at(stage: str, model: str, out: Path) -> str:
+    """What this stage of an adoption says; the later ones are not begun."""
+    return next(line for each, line in adopting.adopt(model, out, Wish()) if each == stage)
+
+
+def test_engines_that_stand_while_the_fuel_is_frozen_are_started_with_fuel_that_flows(tmp_path: Path) -> None:
+    assert found_at("trim", "Short_S23", tmp_path).startswith("62.9 m/s")
 
 
 @pytest.fixture(scope="module")

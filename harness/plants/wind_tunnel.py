@@ -171,9 +171,18 @@ class WindTunnel:
         fdm["propulsion/magneto_cmd"] = 3
         fdm["propulsion/cutoff_cmd"] = 0
         fdm.get_propulsion().init_running(-1)
-        fdm["propulsion/starter_cmd"] = 1
+        self._crank()
+        if standing := [i for i in range(self.engines) if not fdm[f"propulsion/engine[{i}]/set-running"]]:
+            fdm["propulsion/fuel_freeze"] = 0  # some engines start only when fuel flows
+            for i in standing:
+                fdm[f"propulsion/engine[{i}]/set-running"] = 1
+            self._crank()
+            fdm["propulsion/fuel_freeze"] = 1
+
+    def _crank(self) -> None:
+        self.fdm["propulsion/starter_cmd"] = 1
         self.run(_STARTER)
-        fdm["propulsion/starter_cmd"] = 0
+        self.fdm["propulsion/starter_cmd"] = 0
         self.run(1.0)
 
     def solve(self, unknowns: Sequence[str], rows: Sequence[int], rounds: int = 12, tolerance: float = 5e-4) -> Array:
