@@ -4,7 +4,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -149,6 +149,7 @@ def run(
     retry_failed: bool = False,
     timeout: float | None = None,
     engine: str | None = None,
+    dask: str | None = None,
     progress: bool = False,
 ) -> "pd.DataFrame":
     """Flies the matrix of a settings file into a directory, and returns its results as `load_results` does.
@@ -167,15 +168,20 @@ def run(
     - `timeout`: a flight hangs, and is ended, when it gains no simulated time while its worker computes for so many s;
       None is 60.
     - `engine`: "python" or "compiled"; None is compiled where that can be and is quicker. The results are the same.
+    - `dask`: fly on a Dask cluster instead of processes of this machine: the address or the file of its scheduler, as
+      `--dask` of the command line; see the guide "Many machines".
     - `progress`: print how far it is to standard error, once a second.
 
     Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
     used; `WorkersError` when the processes cannot fly; `ArgumentError` for an option that there is not;
-    `HarnessError` for flights that the engine "compiled" cannot fly. A flight that fails is a row, not an error.
+    `HarnessError` for flights that the engine "compiled" cannot fly, and for a cluster that cannot be used. A flight
+    that fails is a row, not an error.
 
     >>> results = harness.run("experiments/gains.toml", out="out/gains", progress=True)
     >>> results.groupby("plant")["convergence_time_s"].median()
+    >>> harness.run("experiments/gains.toml", out="out/gains", dask="127.0.0.1:8786")
     """
+    from harness.runs.cluster import connected
     from harness.runs.engine import ENGINES, engine_for
     from harness.runs.matrix import read_matrix
     from harness.runs.results import export, load_results
@@ -188,6 +194,8 @@ def run(
     for name, value, least in (("workers", workers, 0), ("limit", limit, 1)):
         if value is not None and value < least:
             raise ArgumentError(f"{name} is {value}, must be None or at least {least}")
+    if workers is not None and dask is not None:
+        raise ArgumentError("workers is for processes of this machine, dask has workers of its own: leave one out")
     if timeout is not None and not timeout > 0.0:
         raise ArgumentError(f"timeout is {timeout:g}, must be None or above 0 s")
     if timeout is not None and workers == 0:
@@ -200,18 +208,21 @@ def run(
     workers = (os.cpu_count() or 1) if workers is None else workers
     matrix = read_matrix(read_settings(path, overrides), draft=True)
     *_, size = survey(matrix, limit, positions_done(matrix, out, retry_failed=retry_failed))  # finds every mistake
-    options = Options(
-        workers=workers,
-        limit=limit,
-        log=log,
-        retry_failed=retry_failed,
-        timeout=timeout or TIMEOUT,
-        typical=size.typical,
-        compiled=engine_for(size, engine).compiled,
-    )
-    states = fly(matrix, out, options)
-    for _ in _printed(states) if progress else states:
-        pass
+    compiled = engine_for(size, engine).compiled
+    with nullcontext() if dask is None else connected(dask) as cluster:
+        options = Options(
+            workers=cluster.workers if cluster else workers,
+            limit=limit,
+            log=log,
+            retry_failed=retry_failed,
+            timeout=timeout or TIMEOUT,
+            typical=size.typical,
+            compiled=compiled,
+            cluster=cluster,
+        )
+        states = fly(matrix, out, options)
+        for _ in _printed(states) if progress else states:
+            pass
     export(out)
     return load_results(out)
 

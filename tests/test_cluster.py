@@ -14,9 +14,13 @@ import psutil
 import pytest
 
 import harness
-from harness.runs.cluster import _unfit
+from harness.key import identity
+from harness.runs import cluster as clusters
+from harness.runs.cluster import _unfit, connected
 from harness.runs.far import Report, versions
 from harness.runs.store import StoreError, reading
+from harness.runs.wall_time import WallTime
+from harness.runs.workers import Task, WorkersError
 from tests.builders import ROOT, command, copied_airframe, digests, fly_matrix, invoke, words_of, write
 
 LAW = '''
@@ -228,6 +232,31 @@ def test_a_scheduler_or_all_workers_that_end_are_one_line_and_rows_are_kept(
     assert f"{mine.scheduler}: {said}; what was flown is kept, and the same command resumes the run" in told
     assert "distributed" not in told
     assert 0 < _rows(out) < 2000
+
+
+def test_a_scheduler_that_ends_while_no_flight_is_out_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As between two batches of a search, or before the first flight."""
+    monkeypatch.setattr(clusters, "_CONNECTING", 2.0)
+    flight = harness.Flight(plant="kinematic", law=harness.law("nftsm"), duration=1.0)
+    this = identity(flight)
+    tasks = [Task(this.key, 0, flight, this.version.number, "none", compiled=False)]
+    with _running(tmp_path, workers=1) as mine, connected(mine.scheduler) as cluster:
+        psutil.Process(mine.process).kill()
+        _until(lambda: cluster.client.status != "running")
+        flying = cluster.fly_all(iter(tasks), tmp_path, wall_time=WallTime(), timeout=60.0, seconds=0.0)
+        with pytest.raises(WorkersError, match="the scheduler is gone; what was flown is kept"):
+            list(flying)
+
+
+def test_in_python_a_matrix_is_flown_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
+    file = write(tmp_path / "many.toml", MANY.replace("count = 160", "count = 8"))
+    far = harness.run(file, tmp_path / "far", dask=cluster.scheduler)
+    home = harness.run(file, tmp_path / "home", workers=0)
+    assert list(far["digest"]) == list(home["digest"])
+    with pytest.raises(harness.ArgumentError, match="dask has workers of its own: leave one out"):
+        harness.run(file, tmp_path / "far", dask=cluster.scheduler, workers=2)
+    with pytest.raises(harness.HarnessError, match=r"nowhere\.json: there is no such file"):
+        harness.run(file, tmp_path / "far", dask="nowhere.json")
 
 
 def test_falsify_map_and_tune_fly_on_a_cluster_what_they_fly_at_home(cluster: Cluster, tmp_path: Path) -> None:

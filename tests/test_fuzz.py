@@ -160,16 +160,19 @@ CALLS: Mapping[str, Sequence[str]] = {
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement range_error_peak_m<5 --json",
         "MATRIX --out OUT --over WORD --requirement laps>1",
         "FILE --out OUT --over law.k2=1:9 --requirement outcome=WORD",
+        "FILE --out OUT --over law.k2=1:9 --requirement laps>1 --dask OUT/WORD.json",
     ],
     "merge": ["RUN RUN --out OUT/c", "RUN WORD --out OUT/c", "RUN --out OUT", "WORD --out WORD"],
     "map": [
         f"FILE --out OUT {SHORT} --workers 0 --x law.k2=1:9 --y start.heading_deg=0:90 --resolution 10 --flights 130",
         "MATRIX --out OUT --x WORD --y law.k3=0:1", "FILE --out OUT --x law.k2=1:9 --y law.k3=0:1 --of WORD",
+        "FILE --out OUT --x law.k2=1:9 --y law.k3=0:1 --dask WORD",
     ],
     "tune": [
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --minimise range_error_peak_m",
         "MATRIX --out OUT --over WORD --minimise laps", "FILE --out OUT --over law.k2=1:9 --minimise WORD",
         "FILE --out OUT --over law.k2=1:9 --minimise laps --subject-to WORD",
+        "FILE --out OUT --over law.k2=1:9 --minimise laps --dask WORD",
     ],
     "show": ["RUN", "RUN:KEY", "RUN --where SET --sort WORD", "RUN --columns WORD --csv", "WORD", "RUN:WORD"],
     "compare": [

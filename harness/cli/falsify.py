@@ -68,6 +68,8 @@ def falsify(
           --over target.speed_mps=0:6 --requirement 'range_error_peak_m < 5'
       harness falsify experiments/falsify.toml --out out/lost --over target.speed_mps=0:12 \\
           --requirement 'outcome = completed'
+      harness falsify experiments/falsify.toml --out out/lost --over target.speed_mps=0:12 \\
+          --requirement 'outcome = completed' --dask 127.0.0.1:8786
     """
     from dataclasses import replace
 

@@ -74,6 +74,8 @@ def map_(
       harness map experiments/gains.toml --out out/map --x law.k2=0.5:20 --y law.k3=0:10 --of chatters
       harness map experiments/stationary.toml --out out/basin --x start.position_m.east=-400:400 \\
           --y start.heading_deg=0:360 --set plant=kinematic
+      harness map experiments/basin.toml --out out/wide --x start.position_m.east=-400:400 \\
+          --y start.heading_deg=0:360 --dask 127.0.0.1:8786
     """
     from dataclasses import replace
 

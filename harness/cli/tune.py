@@ -80,6 +80,8 @@ def tune(
           --minimise range_error_rms_m --subject-to chatters=false
       harness tune experiments/tune.toml --out out/front --over law.k2=0.5:20 \\
           --minimise range_error_peak_m --minimise convergence_time_s --subject-to 'range_error_peak_m < 5'
+      harness tune experiments/tune.toml --out out/tune --over law.k2=0.5:20 --minimise range_error_rms_m \\
+          --dask 127.0.0.1:8786
     """
     from dataclasses import replace
 

@@ -53,7 +53,8 @@ def connected(where: str) -> Iterator["Cluster"]:
         distributed: Any = import_module("distributed")
     except ImportError:
         raise ClusterError(
-            "--dask needs the package distributed, here and on every worker: pip install 'standoff-harness[dask]'"
+            "a Dask cluster needs the package distributed, here and on every worker: "
+            "pip install 'standoff-harness[dask]'"
         ) from None
     for name in ("distributed", "distributed.client"):  # each has a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is told in one line
@@ -66,7 +67,9 @@ def connected(where: str) -> Iterator["Cluster"]:
         how = {"address": where}
         address = where
     else:
-        raise ClusterError(f"--dask is {where!r}, must be HOST:PORT, tcp://HOST:PORT, tls://HOST:PORT or FILE.json")
+        raise ClusterError(
+            f"the Dask scheduler is {where!r}, must be HOST:PORT, tcp://HOST:PORT, tls://HOST:PORT or FILE.json"
+        )
     if "tls://" in address and distributed.Security().get_connection_args("client")["ssl_context"] is None:
         # a client that finds this out itself waits 20 s at the end, and shows a traceback
         raise ClusterError(
