@@ -24,6 +24,7 @@ from numba import njit as jit
 from harness.compiled import arithmetic as arithmetic_
 
 '''
+_LOOP = "jit(cache=True, _nrt=False)"  # what it calls inherits this: references to arrays are not counted
 FOLDER = "STANDOFF_HARNESS_CACHE"  # the variable that names the folder of the kernels
 _KEPT = 100  # modules
 
@@ -83,7 +84,7 @@ def _loaded(function: Any) -> Kernel:
     body, name, told = module_of(function)
     arithmetic = content_hash((Path(__file__).parent / "arithmetic.py").read_bytes())
     versions = f"{sys.version_info[:3]}, {numba.__version__}, {llvmlite.__version__}, {processor()}, {arithmetic}"
-    text = f"{_HEADER.format(versions=versions)}{body}\n{name} = jit(cache=True)({name}.py_func)\n"
+    text = f"{_HEADER.format(versions=versions)}{body}\n{name} = {_LOOP}({name}.py_func)\n"
     file = folder() / f"kernel_{content_hash(text.encode())}.py"
     if not file.exists():
         with replacing(file) as partial:

@@ -30,6 +30,7 @@ _ARITHMETIC = {
         "copysign", "remainder", "fmod", "hypot", "isfinite", "isnan", "radians", "degrees",
     )
 } | {math.pow: "power", dot: "dot"}  # fmt: skip
+_ALLOCATES = "jit(_nrt=True)"  # a law of one's own may make lists: references are counted there
 _REFUSED = {
     ast.Nonlocal: "it keeps a variable from one call to the next",
     ast.Global: "it changes a variable of its module",
@@ -195,7 +196,8 @@ class _Writer(ast.NodeTransformer):
             for one in made if isinstance(made, list) else [made] if made else []:
                 text = ast.unparse(ast.fix_missing_locations(one))
                 lines += [f"    {line}" for line in text.splitlines()]
-        return f"@jit\ndef {name}({', '.join(names)}):\n" + "\n".join(lines or ["    pass"])
+        decorator = "jit" if _is_ours(self._of.function) else _ALLOCATES
+        return f"@{decorator}\ndef {name}({', '.join(names)}):\n" + "\n".join(lines or ["    pass"])
 
     def _kept(self) -> list[str]:
         """The names of the values in `held_`, in their order."""
@@ -422,6 +424,11 @@ def _arithmetic(name: str) -> ast.Attribute:
 
 def _plain(name: str) -> str:
     return name if name.isidentifier() else "lambda_"
+
+
+def _is_ours(function: FunctionType) -> bool:
+    """Whether it is a function of the harness: none of them makes a list or an array."""
+    return function.__globals__.get("__name__", "").partition(".")[0] in ("harness", "autopilot")
 
 
 def _is_record(value: Any) -> bool:
