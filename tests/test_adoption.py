@@ -189,6 +189,11 @@ def test_engines_that_stand_while_the_fuel_is_frozen_are_started_with_fuel_that_
     assert found_at("trim", "Short_S23", tmp_path).startswith("62.9 m/s")
 
 
+def test_a_model_that_reads_the_cockpit_and_instruments_of_flightgear_is_told_what_jsbsim_knows(tmp_path: Path) -> None:
+    assert "3 as in FlightGear" in found_at("load", "p51d", tmp_path)
+    assert "thrust 2.93e+03 N at throttle 0.2, 1.29e+04 N at 1" in found_at("engine", "p51d", tmp_path)
+
+
 @pytest.fixture(scope="module")
 def altered(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """The same of a c172p whose aileron has a name of its own, and whose rudder goes no further than a tenth."""

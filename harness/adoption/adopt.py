@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import aircraft
+from harness.adoption import cockpit
 from harness.adoption.adoption import STANDARD, STEP, Adoption, Wish, motion, write
 from harness.adoption.design import designed
 from harness.adoption.linear import COMMANDS, linearised
@@ -20,7 +21,7 @@ from harness.adoption.refusal import RefusalError
 from harness.child import MEMORY, ChildError, limited
 from harness.files import make_folder, write_text
 from harness.identification.identify import identify
-from harness.plants.model import FT, SLUG, ModelError, check_body, load, unknown
+from harness.plants.model import FT, SLUG, Fdm, ModelError, check_body, load, unknown
 from harness.plants.plant import End, PlantError
 from harness.plants.turn import GRAVITY
 from harness.plants.wind_tunnel import STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
@@ -103,8 +104,10 @@ def _load(a: Adoption) -> Found:
     invented = tuple(sorted(unknown(fdm, a.names)))
     for missing in invented:
         fdm[missing] = 0.0
+    told = tuple(sorted(_told(a, fdm).items()))
     engines = int(fdm.get_propulsion().get_num_engines())
     throttles = tuple(f"fcs/throttle-cmd-norm[{i}]" for i in range(max(1, engines)))
+    throttles += cockpit.throttles(a.names - set(a.writers), engines)
     controls = Controls.of({**_table(replace(STANDARD, throttles=throttles)), **(a.wish.controls or {})})
     fdm.run_ic()
     check_body(fdm)
@@ -112,10 +115,19 @@ def _load(a: Adoption) -> Found:
     if not area > 0.0:
         raise RefusalError("load", f"the wing has an area of {area:g} m^2")
     a = replace(
-        a, invented=invented, controls=controls, mass=mass, area=area, span=FT * fdm["metrics/bw-ft"],
+        a, invented=invented, told=told, controls=controls, mass=mass, area=area, span=FT * fdm["metrics/bw-ft"],
         chord=FT * fdm["metrics/cbarw-ft"],
     )  # fmt: skip
-    return a, f"{len(invented)} properties invented, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
+    made = f"{len(invented)} properties invented, {len(told)} as in FlightGear"
+    return a, f"{made}, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
+
+
+def _told(a: Adoption, fdm: Fdm) -> dict[str, str]:
+    """Of each property of FlightGear that the model names and does not write, the one of JSBSim that it follows."""
+    names = {name.replace("[0]", "") for name in a.names} - set(a.writers)
+    sources = {name: source for name in names if (source := cockpit.source_of(name))}
+    missing = unknown(fdm, [source.lstrip("-") for source in sources.values()])
+    return {name: source for name, source in sources.items() if source.lstrip("-") not in missing}
 
 
 def _table(controls: Controls) -> dict[str, object]:

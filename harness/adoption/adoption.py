@@ -47,6 +47,7 @@ class Adoption:
     writers: Mapping[str, str]  # of a property: the component of the model that writes it
     controls: Controls = STANDARD
     invented: tuple[str, ...] = ()
+    told: tuple[tuple[str, str], ...] = ()  # properties of FlightGear, each with that of JSBSim that it follows
     mass: float = 1.0
     area: float = 1.0
     span: float = 1.0
@@ -80,7 +81,7 @@ def write(adoption: Adoption, model: Original) -> None:
     template = Environment(
         loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, keep_trailing_newline=True
     ).get_template(_TEMPLATE)
-    inner_loop = template.render(rounded, controls=adoption.controls, invented=adoption.invented)
+    inner_loop = template.render(rounded, controls=adoption.controls, invented=adoption.invented, told=adoption.told)
     write_text(aircraft.model(folder), with_inner_loop(model, inner_loop))
     write_text(folder / "inner_loop.toml", _inner_loop(rounded))
     write_text(folder / "airframe.toml", "\n".join(_airframe(adoption, model)) + "\n")
@@ -115,6 +116,7 @@ def _airframe(a: Adoption, model: Original) -> Iterator[str]:
     yield from ("", "[aero]", f"alpha_stall = {_v(a.stall, 'rad')}")
     yield from ("", "[adopted]", f"step = {STEP}", f"altitude = {a.start.altitude!r}", f"engine = {quoted(a.engine)}")
     yield f"invented = {quoted(list(a.invented))}"
+    yield f"told = {quoted([name for name, _ in a.told])}"
     yield f"left_out = {quoted([text.rpartition('/')[2] for text in model.fenced.left_out])}"
     yield from ("", "[adopted.sources] # their hashes", *_sources(model))
     yield from ("", "[adopted.controls]", f"elevator = {quoted(a.controls.elevator)}")
