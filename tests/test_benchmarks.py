@@ -14,6 +14,7 @@ from benchmarks import (
     performance,
     planted_failures,
     planted_peers,
+    recipes,
     recording_speed,
     runs,
 )
@@ -117,3 +118,10 @@ def test_a_long_log_of_each_format_is_read(capsys: pytest.CaptureFixture[str]) -
     _, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines(capsys)]
     assert [row[:2] for row in rows] == [[kind, "2"] for kind in long_logs.WRITERS]
     assert all(float(minutes) > 1.0 and float(memory) > 50.0 for _, _, minutes, memory, _ in rows)
+
+
+@pytest.mark.parametrize("heading", ["On SLURM", "On Kubernetes"])
+def test_the_recipes_of_the_guide_to_many_machines_are_python(heading: str) -> None:
+    code = recipes.recipe(heading)
+    compile(code, heading, "exec")
+    assert code.endswith('")\n')
