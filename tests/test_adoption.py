@@ -194,6 +194,26 @@ def test_a_model_that_reads_the_cockpit_and_instruments_of_flightgear_is_told_wh
     assert "thrust 2.93e+03 N at throttle 0.2, 1.29e+04 N at 1" in found_at("engine", "p51d", tmp_path)
 
 
+def test_an_aircraft_with_strongly_damped_pitching_holds_its_altitude_in_a_turn(tmp_path: Path) -> None:
+    said = found_at("90 deg", "XB-70", tmp_path)
+    assert float(said.partition("altitude ")[2].partition(" m")[0]) < 20.0
+
+
+def refused_below_50(adoption: Adoption) -> tuple[Adoption, str]:
+    if adoption.start.airspeed < 50.0:
+        raise RefusalError("design", "no bank loop is stable")
+    return adoption, "stable"
+
+
+def test_an_aircraft_that_cannot_be_flown_in_its_first_trim_is_tried_in_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(adopting, "STAGES", {**adopting.STAGES, "design": refused_below_50})
+    stages = adopting.adopt("c172p", tmp_path, Wish())
+    assert ("design", "no bank loop is stable: at another airspeed") in iter(stages)
+    assert next(line for stage, line in stages if stage == "trim").startswith("51.")
+
+
 @pytest.fixture(scope="module")
 def altered(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """The same of a c172p whose aileron has a name of its own, and whose rudder goes no further than a tenth."""

@@ -32,6 +32,8 @@ SECONDS = 60.0  # that all stages together may take
 _THROTTLES = (0.15, 0.4, 0.65, 0.9)
 _MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # of a command in trim
 
+_IN_TRIM = ("linearise", "design", "90 deg", "circle")  # stages that another trim may pass
+
 Found = tuple[Adoption, str]
 _FILES = ("{name}.xml", "airframe.toml", "inner_loop.toml", "identified.toml", "circle.toml")
 
@@ -58,7 +60,9 @@ def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterato
             names=frozenset(named(model.root)),
             writers=writers(model.root),
         )
-        for stage, work in {**STAGES, "identify": _identify}.items():
+        stages, grounded = [*STAGES, "identify"], None
+        while stages:
+            stage, work = stages[0], {**STAGES, "identify": _identify}[stages[0]]
             write(adoption, model)
             try:
                 adoption, line = limited(stage, max(1.0, end - time.monotonic()), MEMORY, work, adoption)
@@ -71,10 +75,16 @@ def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterato
                 refusal = error
             else:
                 yield from ((stage, part) for part in line.splitlines())
+                del stages[0]
                 continue
-            if stage in STAGES:
-                raise refusal from None
-            yield stage, f"without lagged and coordinated: {refusal.message}"
+            if stage == "identify":
+                yield stage, f"without lagged and coordinated: {refusal.message}"
+                break
+            grounded = grounded or refusal
+            if stage not in _IN_TRIM or not adoption.speeds or time.monotonic() > end:
+                raise grounded from None
+            yield stage, f"{refusal.message}: at another airspeed"
+            stages = ["trim", *_IN_TRIM, "identify"]
         write(adoption, model)
         make_folder(kept)
         for pattern in _FILES:
@@ -150,7 +160,8 @@ def _tunnel(a: Adoption) -> WindTunnel:
 def _engine(a: Adoption) -> Found:
     density = 1.225 * (1.0 - 2.2558e-5 * a.wish.altitude) ** 4.2559
     slow = math.sqrt(2.0 * a.mass * GRAVITY / (density * a.area * LIFT_COEFFICIENT))
-    a = replace(a, start=replace(a.start, airspeed=a.wish.airspeed or slow, altitude=a.wish.altitude))
+    speeds = (a.wish.airspeed,) if a.wish.airspeed else tuple(slow * share for share in SPEEDS)
+    a = replace(a, start=replace(a.start, airspeed=speeds[0], altitude=a.wish.altitude), speeds=speeds)
     tunnel = _tunnel(a)
     if not tunnel.engines:
         raise RefusalError("engine", "no engine: a glider cannot hold its height")
@@ -211,15 +222,14 @@ def _effect(tunnel: WindTunnel, name: str, axis: int) -> float:
 
 
 def _trim(a: Adoption) -> Found:
-    speeds = [a.start.airspeed] if a.wish.airspeed else [a.start.airspeed * share for share in SPEEDS]
-    tunnel = _tunnel(a)
+    speeds, tunnel = a.speeds, _tunnel(a)
     best, why = math.inf, ""
-    for speed in speeds:
+    for i, speed in enumerate(speeds, 1):
         tunnel.start = replace(a.start, airspeed=speed)
         left, reason = _trimmed(tunnel)
         if not reason:
             s = tunnel.setting
-            return replace(a, start=tunnel.start, setting=s), (
+            return replace(a, start=tunnel.start, setting=s, speeds=speeds[i:]), (
                 f"{speed:.1f} m/s, pitch {math.degrees(s.pitch):.1f} deg, bank {math.degrees(s.bank):.2f} deg, "
                 f"elevator {s.elevator:.2f}, aileron {s.aileron:.2f}, rudder {s.rudder:.2f}, "
                 f"throttle {s.throttle:.2f}; {left:.1e} m/s^2 or rad/s^2 is left"

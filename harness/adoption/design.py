@@ -234,6 +234,7 @@ def _pitching(
         omega = min(omega, max(0.7 / linear.elevator.lag, math.sqrt(max(stiffness, 0.0) + 0.3)))
         k = omega**2 - max(stiffness, 0.0)
     k_q = max(0.0, 2.0 * 0.7 * omega - damping)
+    k *= max(1.0, damping / (2.0 * 0.7 * omega))  # what is damped more moves more slowly
     heave = max(-float(A[0, 0]), 0.2)
     climb = 1.2
     path = min(heave * (1.0 + climb), 0.4 * omega)
