@@ -222,7 +222,7 @@ def _effect(tunnel: WindTunnel, name: str, axis: int) -> float:
 
 
 def _trim(a: Adoption) -> Found:
-    speeds, tunnel = a.speeds, _tunnel(a)
+    speeds, tunnel = a.speeds or (a.start.airspeed,), _tunnel(a)
     best, why = math.inf, ""
     for i, speed in enumerate(speeds, 1):
         tunnel.start = replace(a.start, airspeed=speed)

@@ -52,7 +52,7 @@ class Adoption:
     area: float = 1.0
     span: float = 1.0
     chord: float = 1.0
-    speeds: tuple[float, ...] = ()  # airspeeds at which a trim is still to be sought
+    speeds: tuple[float, ...] = ()  # at which a trim is still to be sought; without any, at that of the start
     start: Start = Start(heading=0.0)
     setting: TrimPoint = TrimPoint()
     stall: float = 0.3
