@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +147,12 @@ seed = { start = 0, count = 12 }
     assert all(each["seeds"] == 12 and each["further_seeds"] == 40 for each in known)
     done = invoke("compare", out, "--variance-reduction", "--csv")
     assert done.exit_code == 2
+    summary, *_ = invoke("compare", out, "--variance-reduction").stdout.splitlines()
+    saving = [f"{each['factor_of_flights']:.3g}" for each in known if each["factor_of_flights"] >= LEAST_SAVED]
+    assert saving
+    for option, name in (("--out", "a.html"), ("--markdown", "a.md")):
+        done = invoke("report", out, option, tmp_path / name, "--variance-reduction")
+        assert done.exit_code == 0, done.output
+        _, _, section = (tmp_path / name).read_text().partition("A cheaper plant as a control variate")
+        assert summary in section
+        assert all(re.search(rf"[>|] ?{re.escape(factor)} ?[<|]", section) for factor in saving)

@@ -179,7 +179,10 @@ CALLS: Mapping[str, Sequence[str]] = {
         "RUN", "RUN --json --set SET", "RUN --by WORD --baseline WORD", "RUN --where SET", "RUN --by seed --latex",
         "RUN --where WORD --csv", "RUN --variance-reduction --where SET",
     ],
-    "report": ["RUN --out OUT/a.html", "RUN --markdown OUT/a.md --set SET", "RUN --out OUT/a.html --by WORD"],
+    "report": [
+        "RUN --out OUT/a.html", "RUN --markdown OUT/a.md --set SET", "RUN --out OUT/a.html --by WORD",
+        "RUN --markdown OUT/a.md --variance-reduction --where SET",
+    ],
     "demo": ["--out /dev/null"],
     "reproduce": ["--out /dev/null --workers WORD"],
     "list": ["WORD"],

@@ -9,6 +9,7 @@ from harness.cli._input import BadInput
 
 if TYPE_CHECKING:
     from harness.verdict.comparison import Comparison
+    from harness.verdict.control_variates import Reduced
     from harness.verdict.report import Origin
 
 
@@ -42,6 +43,17 @@ def read_comparison(
     except (StoreError, CompareError) as error:
         text = str(error)
         raise BadInput(text if text.startswith(str(folders[0])) else f"{place}: {text}") from None
+
+
+def reduced(comparison: Comparison, folders: tuple[Path, ...]) -> list[Reduced]:
+    """What a cheaper plant saves as a control variate: see `reductions`. BadInput where no flight can serve as one."""
+    from harness.verdict.control_variates import reductions
+    from harness.verdict.pairs import CompareError
+
+    try:
+        return reductions(comparison.table)
+    except CompareError as error:
+        raise BadInput(f"{' and '.join(map(str, folders))}: {error}") from None
 
 
 def wanted(where: tuple[str, ...]) -> dict[str, object]:

@@ -63,11 +63,11 @@ def compare(
     """
     import json
 
-    from harness.cli._comparison import read_comparison
+    from harness.cli._comparison import read_comparison, reduced
     from harness.cli._input import BadInput
     from harness.cli._progress import busy
     from harness.verdict.control_variates import lines as reduced_lines
-    from harness.verdict.control_variates import records, reductions
+    from harness.verdict.control_variates import records
     from harness.verdict.export import as_csv, as_document, as_latex, plain
     from harness.verdict.pairs import CompareError
     from harness.verdict.text import lines
@@ -77,10 +77,7 @@ def compare(
     with busy("comparing"):
         comparison, _ = read_comparison(directories, overrides, by, baseline, where)
     place = " and ".join(map(str, directories))
-    try:
-        found = reductions(comparison.table) if reducing else []
-    except CompareError as error:
-        raise BadInput(f"{place}: {error}") from None
+    found = reduced(comparison, directories) if reducing else []
     match form:
         case "json":
             document = as_document(comparison)

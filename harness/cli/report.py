@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 @click.option(
     "--set", "overrides", multiple=True, type=MARGIN, metavar="assess.KEY=VALUE", help="Set a margin; repeatable."
 )
+@click.option(
+    "--variance-reduction",
+    "reducing",
+    is_flag=True,
+    help="Add what a cheaper plant saves; see harness compare.",
+)
 def report(
     directories: tuple[Path, ...],
     out: Path | None,
@@ -35,6 +41,7 @@ def report(
     baseline: str | None,
     where: tuple[str, ...],
     overrides: tuple[str, ...],
+    reducing: bool,
 ) -> None:
     """Write the comparison as one HTML page with figures.
 
@@ -45,13 +52,15 @@ def report(
     Examples:
       harness report out/wind
       harness report out/wind --markdown wind.md
+      harness report out/monte_carlo --variance-reduction
     """
-    from harness.cli._comparison import read_comparison
+    from harness.cli._comparison import read_comparison, reduced
     from harness.cli._input import BadInput
     from harness.cli._paths import writable
     from harness.cli._progress import busy
     from harness.files import write_text
     from harness.verdict import report as job
+    from harness.verdict.control_variates import told
 
     if out is not None and markdown is not None:
         raise BadInput("--out and --markdown exclude each other: each names the one file to write")
@@ -61,9 +70,14 @@ def report(
     path = writable(markdown or out or directories[-1] / "report.html")
     with busy("comparing"):
         comparison, origin = read_comparison(directories, overrides, by, baseline, where)
+        found = reduced(comparison, directories) if reducing else []
+    saved = told(found, " and ".join(map(str, directories))) if found else None
     logs = {} if markdown else _logs(list(job.to_draw(comparison, origin.folder)))
     with busy("drawing"):
-        text = job.markdown(comparison, origin) if markdown else job.page(comparison, origin, logs, _maps(directories))
+        if markdown:
+            text = job.markdown(comparison, origin, saved)
+        else:
+            text = job.page(comparison, origin, logs, _maps(directories), saved)
         write_text(path, text)
     click.echo(f"{path}")
 

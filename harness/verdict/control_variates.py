@@ -37,6 +37,7 @@ from harness.verdict.statistics import Array, Sample, sample, share
 
 LEAST_SAVED = 2.0  # a smaller factor is not worth another number
 LEAST_SEEDS = 12  # on both plants: of fewer the coefficient knows too little
+ALIGNMENT = "lllrrllrr"  # of the columns of `row`
 SHARES = ("lost", "converged")  # beside the metrics that are true or false
 
 
@@ -153,33 +154,53 @@ def reductions(flights: pd.DataFrame) -> list[Reduced]:
     return found
 
 
+class Told(NamedTuple):
+    """What is saved where, and what is not, in words."""
+
+    summary: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]  # where it saves
+    legend: str
+    others: Sequence[tuple[int, str]]  # how many are not done, and why
+    advice: str  # what to fly so that something is saved; empty where something could be told
+
+
+def told(found: Sequence[Reduced], folder: str) -> Told:
+    """Of flights of one highest plant in this folder; `found` is not empty."""
+    plant = found[0].plant
+    saving = [each for each in found if each.saves]
+    why = Counter(each.why or f"saves less than a factor of {LEAST_SAVED:g}" for each in found if not each.saves)
+    return Told(
+        f"Means and shares of {plant}, alone and with a cheaper plant as a control variate: in {len(saving)} of "
+        f"{len(found)} (a metric in a cell) this saves a factor of {LEAST_SAVED:g} or more of {plant} flights.",
+        headings(plant),
+        [row(each) for each in saving],
+        f"Flights: how many times the flights of {plant} would make its own interval as narrow. Time: the same, "
+        "with the time that the cheaper flights took; below 1 more flights of its own are the quicker way.",
+        [(count, reason) for reason, count in why.most_common()],
+        ""
+        if any(each.of for each in found)
+        else "A control variate needs both plants with the same seeds, and the cheaper one with more: fly the file "
+        f"into {folder} again, with --set plant=CHEAPER --set 'seed={{start=FIRST_NEW, count=MANY}}'.",
+    )
+
+
 def lines(found: Sequence[Reduced], folder: str) -> Iterator[str]:
-    """What is saved where, and what is not, for a terminal."""
+    """The same for a terminal."""
     if not found:
         return
-    saving = [each for each in found if each.saves]
-    plant = found[0].plant
-    yield (
-        f"Means and shares of {plant}, alone and with a cheaper plant as a control variate: in {len(saving)} of "
-        f"{len(found)} (a metric in a cell) this saves a factor of {LEAST_SAVED:g} or more of {plant} flights."
-    )
-    if saving:
+    what = told(found, folder)
+    yield what.summary
+    if what.rows:
         yield ""
-        yield from table(headings(plant), map(row, saving), "lllrrllrr")
+        yield from table(what.headings, what.rows, ALIGNMENT)
         yield ""
-        yield (
-            f"Flights: how many times the flights of {plant} would make its own interval as narrow. Time: the same, "
-            "with the time that the cheaper flights took; below 1 more flights of its own are the quicker way."
-        )
-    why = Counter(each.why or f"saves less than a factor of {LEAST_SAVED:g}" for each in found if not each.saves)
-    if why:
+        yield what.legend
+    if what.others:
         yield "Not done:"
-        yield from (f"  {count}: {reason}" for reason, count in why.most_common())
-    if not any(each.of for each in found):
-        yield (
-            "A control variate needs both plants with the same seeds, and the cheaper one with more: fly the file into "
-            f"{folder} again, with --set plant=CHEAPER --set 'seed={{start=FIRST_NEW, count=MANY}}'."
-        )
+        yield from (f"  {count}: {reason}" for count, reason in what.others)
+    if what.advice:
+        yield what.advice
 
 
 def headings(plant: str) -> list[str]:

@@ -9,16 +9,19 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from harness import markup
 from harness.drawing import draw
 from harness.log import FlightLog
 from harness.log.figure import paint
 from harness.log.metric import METRICS
 from harness.settings.columns import DIRECTORY
 from harness.settings.written import written
+from harness.tables import markdown as markdown_table
 from harness.tables import number
 from harness.template import template
 from harness.verdict import answer, curve, figures, flown, grid, moved
 from harness.verdict.comparison import Comparison, Scorecard
+from harness.verdict.control_variates import ALIGNMENT, Told
 from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
 from harness.verdict.pairs import shown, spread
 from harness.verdict.parts import PARTS, Group
@@ -69,8 +72,12 @@ def page(
     origin: Origin,
     logs: Mapping[str, FlightLog] = MappingProxyType({}),
     maps: Mapping[str, bytes] = MappingProxyType({}),
+    saved: Told | None = None,
 ) -> str:
-    """The HTML page; `logs` by key: flights of `to_draw` that are at hand; `maps` by folder: pictures, SVG."""
+    """The HTML page; `logs` by key: flights of `to_draw` that are at hand; `maps` by folder: pictures, SVG.
+
+    `saved`: what a cheaper plant saves as a control variate, where that is asked.
+    """
     added = list(_disturbances(comparison)) if comparison.by == "plant" else []
     judged_parts = [part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)]
     return template("harness.verdict", "report.html.jinja").render(
@@ -92,6 +99,8 @@ def page(
         margins=written(comparison.assess),
         drawings=lambda card: list(_intervals(card)) if card in comparison.answering else [],
         ladders=list(_ladders(comparison)) if comparison.by == "plant" else [],
+        saved=saved,
+        alignment=ALIGNMENT,
         disturbances=added[:MOST_DISTURBED],
         more_disturbances=max(0, len(added) - MOST_DISTURBED),
         listed=list(listed(comparison, origin.folder, logs)),
@@ -105,8 +114,8 @@ def page(
     )
 
 
-def markdown(comparison: Comparison, origin: Origin) -> str:
-    """The answer and the matrix of parts and airframes in Markdown, with the commands that made them."""
+def markdown(comparison: Comparison, origin: Origin, saved: Told | None = None) -> str:
+    """The answer and the matrix of parts and airframes in Markdown, with the commands that made them; see `page`."""
     return template("harness.verdict", "report.md.jinja").render(
         comparison=comparison,
         origin=origin,
@@ -115,8 +124,16 @@ def markdown(comparison: Comparison, origin: Origin) -> str:
         signs=SIGNS,
         parts=[part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)],
         conditions=list(comparison.conditions.itertuples(index=False)),
+        saved=saved,
+        saved_table=markdown_table(saved.headings, _escaped(saved.rows), ALIGNMENT) if saved else (),
         margins=written(comparison.assess),
     )
+
+
+def _escaped(rows: Sequence[Sequence[str]]) -> Iterator[list[str]]:
+    """With metric, cell and control as Markdown; the rest are numbers."""
+    for row in rows:
+        yield [*map(markup.markdown, row[:3]), *row[3:]]
 
 
 def _intervals(card: Scorecard) -> Iterator[Drawing]:
