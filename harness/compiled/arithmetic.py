@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import llvmlite.binding
+import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
@@ -243,10 +244,10 @@ def hypot(x: float, y: float) -> float:
         return math.nan
     if most == 0.0:
         return 0.0
-    _, exponent = math.frexp(most)
-    if exponent < -1023:
-        raise ValueError("too small")
-    scale = math.ldexp(1.0, -exponent)
+    exponent = np.float64(most).view(np.int64) >> 52  # biased by 1023; 0 of a subnormal number
+    if not 0 < exponent < 2045:
+        raise ValueError("too small or too large")
+    scale = np.int64((2045 - exponent) << 52).view(np.float64)  # so that the larger is in [0.5, 1)
     return _root(x * scale, y * scale) / scale
 
 

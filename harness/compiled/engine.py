@@ -102,7 +102,7 @@ def _flown(
     period, last, instruments = flight.guidance_period, flight.periods, Instruments(flight)
     target = _target(flight.target, period, last)
     seen, rows = _known(flight, target)
-    table, told = (np.full((last + 1, n), math.nan) for n in (len(COLUMNS), len(compiled.told)))
+    table, told = (np.empty((last + 1, n)) for n in (len(COLUMNS), len(compiled.told)))
     fixed = (
         period, flight.start.altitude, flight.start.airspeed, *map(float, instruments.wind), instruments.scale,
         flight.metrics.monitoring_range or math.inf,

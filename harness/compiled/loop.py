@@ -119,7 +119,8 @@ def flown(law: LawStep, step: Step) -> Callable[..., Any]:
             table[k, _GUIDANCE + 5] = guidance.unlimited_command
             for i in range(6, len(guidance)):
                 told[k, i - 6] = guidance[i]
-            if math.hypot(state.north - target[k, 0], state.east - target[k, 1]) > monitoring_range:
+            x_r, y_r = state.north - target[k, 0], state.east - target[k, 1]
+            if monitoring_range < math.inf and math.hypot(x_r, y_r) > monitoring_range:
                 return TARGET_LOST, k + 1, now, states
             if k < last:
                 moved, states = step(moved, states, guidance.heading_rate, period, k, line)
