@@ -14,6 +14,7 @@ from harness.world.randomness import stream
 from harness.world.target import TargetState
 
 NO_MEASUREMENT = Measurement(math.nan, math.nan)
+_AHEAD = 1000  # guidance steps
 
 
 class Instruments:
@@ -58,8 +59,9 @@ def heading_in(wind: tuple[float, float], velocity_north: float, velocity_east: 
 class Estimation:
     """The sensor and the filter of one flight: the estimated target at each guidance step.
 
-    `rows` holds one tuple per guidance step, for the log: the filter's `Estimate`, then the latest innovation (NaN in a
-    step without a new measurement). A lost measurement is drawn as well, so that the others keep their noise.
+    `rows` holds one tuple per guidance step, for the log, and for some steps to come: the filter's `Estimate`, then the
+    latest innovation (NaN in a step without a new measurement). A lost measurement is drawn as well, so that the others
+    keep their noise.
     """
 
     def __init__(self, flight: Flight, target: Callable[[float], TargetState]) -> None:
@@ -71,6 +73,8 @@ class Estimation:
         self._step, self._period = flight.step, flight.estimator.period
         self._steps_per_guidance = round(flight.guidance_period / flight.step)
         self._steps_per_measurement = round(flight.estimator.period / flight.step)
+        self._last = flight.periods
+        self._end: End | None = None  # how the filter ended, after the last of the rows
         self._measurements = 0  # due so far, with the lost ones; the next one has this number
 
     def at(self, k: int, truth: TargetState) -> TargetState:
@@ -80,6 +84,24 @@ class Estimation:
         not used: the sensor measures at its own instants, counted in simulation steps. Raises `End` when the filter
         fails or diverges: that is an outcome of the flight.
         """
+        if k >= len(self.rows) and self._end is None:
+            self._work_ahead(k)
+        if k >= len(self.rows) and self._end:
+            raise self._end
+        return TargetState(*self.rows[k][:4])
+
+    def _work_ahead(self, k: int) -> None:
+        """Makes the rows up to the k-th and some more, until the flight or the filter ends.
+
+        No aircraft is in them. In turn with JSBSim, which takes the processor's cache, a filter takes twice the time.
+        """
+        try:
+            for row in range(len(self.rows), min(k + _AHEAD, self._last) + 1):
+                self.rows.append(self._row(row))
+        except End as end:
+            self._end = end
+
+    def _row(self, k: int) -> tuple[float, ...]:
         now, innovation = k * self._steps_per_guidance, NO_MEASUREMENT
         try:
             while self._measurements * self._steps_per_measurement <= now:
@@ -96,8 +118,7 @@ class Estimation:
             raise End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}") from error
         if not all(map(math.isfinite, estimate)):
             raise End(Outcome.INVALID, "the estimator diverged: a number of its estimate is not finite")
-        self.rows.append((*estimate, *innovation))
-        return TargetState(*estimate[:4])
+        return (*estimate, *innovation)
 
 
 def losses(estimator: Estimator, seed: int) -> Callable[[float], bool]:

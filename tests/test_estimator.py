@@ -297,6 +297,15 @@ def test_a_filter_that_diverges_ends_the_flight_as_invalid(estimator: Estimator,
     assert np.isfinite(log["range_error"]).all()
 
 
+def test_a_filter_that_would_fail_after_the_flight_has_ended_is_no_reason() -> None:
+    failing = replace(EKF, estimator=replace(PAPER, range_variance=1e308))
+    with np.errstate(all="ignore"):
+        log = simulate(replace(failing, metrics=MetricSettings(monitoring_range=1.0)))
+        assert simulate(failing).outcome is Outcome.INVALID
+    assert log.outcome is Outcome.TARGET_LOST
+    assert len(log) == 1
+
+
 @pytest.mark.parametrize(("north", "outcome"), [(2000.0, Outcome.COMPLETED), (-100.0, Outcome.TARGET_LOST)])
 def test_the_target_is_lost_beyond_the_monitoring_range_of_the_truth(north: float, outcome: Outcome) -> None:
     believed = replace(PAPER, initial_position=(north, 0.0), initial_position_variance=1e-6)
