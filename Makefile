@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind fuzz adopt-all adopted clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind peers fuzz adopt-all adopted clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -90,6 +90,9 @@ planted: install  ## what falsify finds of planted failures: docs/answers/plante
 
 blind: install  ## what assess recovers of logs with hidden wind, scale, age and signs: docs/answers/blind_logs.md (minutes)
 	$(BIN)/python -m benchmarks.blind_logs
+
+peers: install  ## other simulators beside bare JSBSim, which pip fetches: docs/answers/other_simulators.md (ten minutes)
+	$(BIN)/python -m benchmarks.peers --install
 
 fuzz: install  ## the command line with 2000 inputs that nobody meant, at random (a quarter of an hour)
 	FUZZ=2000 $(BIN)/pytest tests/test_fuzz.py

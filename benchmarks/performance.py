@@ -147,7 +147,8 @@ def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], 
     ]
     yield from markdown(("flight", "asked at most", "times the bare loop", "s"), rows, "lr")
     yield f"\nBuilding, loading and trimming takes {spread(starts, 1e3)} ms; 2.5 ms are asked."
-    yield "[Compiled flights](guide/many_flights.md#compiled-flights) are those of the other plants.\n"
+    yield "[Compiled flights](guide/many_flights.md#compiled-flights) are those of the other plants;"
+    yield "[other simulators](answers/other_simulators.md) fly beside this one on a page of their own.\n"
     yield "## Where the time goes\n"
     yield "From differences of the medians above:\n"
     parts = (

@@ -1,6 +1,7 @@
 """The benchmarks run: each on the least that it measures, with its numbers printed."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from benchmarks import (
     help_speed,
     long_logs,
     maps,
+    peer_flights,
+    peers,
     performance,
     planted_failures,
     planted_peers,
@@ -98,6 +101,30 @@ def test_the_page_of_other_searches_tells_the_median_and_how_many_found_it() -> 
     text = "\n".join(planted_peers.page(results))
     assert text.count("| bowl | 4 | 30 (3) | 30 (3) | 30 (3) | 30 (3) |") == len(planted_failures.SHARES)
     assert "- CMA-ES: 18 of 18 searches found it; the median took 30." in text
+
+
+def test_the_page_of_other_simulators_times_those_that_are_here_and_names_the_others(tmp_path: Path) -> None:
+    page = tmp_path / "other_simulators.md"
+    peers.main(rounds=1, seconds=5, path=page)
+    table, missing = page.read_text(encoding="utf-8").split("## Not measured")
+    for name, of in peer_flights.SIMULATORS.items():
+        rows = [line for line in table.splitlines() if line.startswith(f"| {name} |")]
+        if not of.requires:
+            assert len(rows) == 1, name
+        assert bool(rows) != (f"- {of.package}: ModuleNotFoundError: No module named " in missing)
+    (_, ratio) = medians(next(line for line in table.splitlines() if line.startswith("| this harness |")))
+    assert ratio > 0.8
+
+
+def test_a_flight_that_fell_from_the_sky_is_not_timed() -> None:
+    for end in (peer_flights.End(4.0, 100.0, 0.0), peer_flights.End(5.0, 0.0, 0.0), peer_flights.End(5.0, 100.0, 3.1)):
+        with pytest.raises(RuntimeError, match="flew"):
+            peer_flights.flown(partial(peer_flights.End, *end), 5.0)
+
+
+def test_why_a_simulator_is_missing_tells_no_place_of_this_machine() -> None:
+    told = peers.plain("OSError: /some/place/libmodel.so: cannot open, see https://some.host/page\nmore")
+    assert told == "OSError: libmodel.so: cannot open, see "
 
 
 def test_the_page_of_what_a_flight_costs_has_every_case_and_part(
