@@ -180,23 +180,41 @@ def test_a_model_that_cannot_fly_is_refused_with_its_cause_and_leaves_no_folder(
     assert not (tmp_path / "out" / model).exists()
 
 
-def found_at(stage: str, model: str, out: Path) -> str:
-    """What this stage of an adoption says; the later ones are not begun."""
-    return next(line for each, line in adopting.adopt(model, out, Wish()) if each == stage)
+def found_up_to(stage: str, model: str, out: Path) -> dict[str, str]:
+    """What the stages of an adoption say, up to this one; the later ones are not begun."""
+    said = {}
+    for each, line in adopting.adopt(model, out, Wish()):
+        said[each] = line
+        if each == stage:
+            break
+    return said
 
 
 def test_engines_that_stand_while_the_fuel_is_frozen_are_started_with_fuel_that_flows(tmp_path: Path) -> None:
-    assert found_at("trim", "Short_S23", tmp_path).startswith("62.9 m/s")
+    assert found_up_to("trim", "Short_S23", tmp_path)["trim"].startswith("62.9 m/s")
 
 
 def test_a_model_that_reads_the_cockpit_and_instruments_of_flightgear_is_told_what_jsbsim_knows(tmp_path: Path) -> None:
-    assert "3 as in FlightGear" in found_at("load", "p51d", tmp_path)
-    assert "thrust 2.93e+03 N at throttle 0.2, 1.29e+04 N at 1" in found_at("engine", "p51d", tmp_path)
+    said = found_up_to("engine", "p51d", tmp_path)
+    assert "3 as in FlightGear" in said["load"]
+    assert "thrust 2.93e+03 N at throttle 0.2, 1.29e+04 N at 1" in said["engine"]
 
 
 def test_an_aircraft_with_strongly_damped_pitching_holds_its_altitude_in_a_turn(tmp_path: Path) -> None:
-    said = found_at("90 deg", "XB-70", tmp_path)
+    said = found_up_to("90 deg", "XB-70", tmp_path)["90 deg"]
     assert float(said.partition("altitude ")[2].partition(" m")[0]) < 20.0
+
+
+@pytest.mark.parametrize(("model", "because"), [("c172x", "its surfaces have play"), ("Camel", "its rotor is heavy")])
+def test_what_moves_late_or_with_play_is_waited_for_in_the_trim(model: str, because: str, tmp_path: Path) -> None:
+    left = found_up_to("trim", model, tmp_path)["trim"].rpartition("; ")[2]
+    assert float(left.partition(" ")[0]) < 5e-4, because
+
+
+def test_an_aircraft_turns_no_steeper_than_its_rudder_holds_and_then_flies(tmp_path: Path) -> None:
+    said = found_up_to("90 deg", "Camel", tmp_path)
+    assert "turns of 20 deg, for which aileron and rudder suffice" in said["design"]
+    assert said["90 deg"]
 
 
 def refused_below_50(adoption: Adoption) -> tuple[Adoption, str]:

@@ -305,14 +305,16 @@ def _design(a: Adoption) -> Found:
     assert a.linear is not None
     wanted = math.inf if a.wish.bandwidth is None else a.wish.bandwidth
     g = designed(a.linear, a.setting._asdict(), a.stall, a.wish.max_bank, wanted)
-    law = law_of(a.start.airspeed, a.wish.max_bank, 1.0 / g.lag)
+    law = law_of(a.start.airspeed, g.max_bank, 1.0 / g.lag)
     told = f"bank loop {g.bandwidth:.2g} rad/s, limited by {g.limited_by}; least damping {g.damping:.2f}"
+    if g.max_bank < a.wish.max_bank:
+        told += f"; turns of {math.degrees(g.max_bank):.0f} deg, for which aileron and rudder suffice"
     return replace(a, gains=g, law=law), told
 
 
 def _turn(a: Adoption) -> Found:
     assert a.gains is not None
-    t = turned(a.folder, a.start, STEP, a.wish.max_bank, a.gains.lag)
+    t = turned(a.folder, a.start, STEP, a.gains.max_bank, a.gains.lag)
     if faults := t.faults(a.start.airspeed):
         raise RefusalError("90 deg", "; ".join(faults))
     return replace(a, flown={"turn": t}), (

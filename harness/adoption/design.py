@@ -20,12 +20,16 @@ Array = NDArray[np.float64]
 ZETA = 0.8
 LEAST_DAMPING = 0.28
 _GROWING = 0.02  # 1/s: what grows more slowly, guidance holds
+_AILERON, _RUDDER = 0.95, 0.8  # of what the trim leaves: the limits of the inner loop
+_IN_TURN = 0.8  # of these limits, that a steady turn may take
+_LEAST_BANK, _SIDESLIP = math.radians(10.0), math.radians(4.0)  # in turns
 _STEP = math.radians(45.0)  # of the bank, that the whole aileron may answer
 _WOBBLE = math.radians(1.0)  # of the bank, that hysteresis may leave
 ADOPTED_GAINS = (  # beside those of the inner loop itself
     "aileron-in-turn", "aileron-from-sideslip", "bank-i", "bank-model-per-s",
     "rudder-in-turn", "rudder-from-roll-rate", "sideslip-i", "sideslip-limit",
 )  # fmt: skip
+_NO_RUDDER = 1e-3  # rad/s^2 of its whole travel
 _P, _Q, _R, _W, _U = 3, 4, 5, 2, 0
 
 
@@ -39,6 +43,7 @@ class LoopDesign:
     bandwidth: float  # rad/s, of the bank's loop
     limited_by: str
     damping: float  # of the least damped oscillation of the linear loop
+    max_bank: float  # rad: what was asked, or what rudder and aileron coordinate
 
     @property
     def lag(self) -> float:
@@ -52,6 +57,7 @@ def designed(linear: Linear, trim: Mapping[str, float], stall: float, max_bank: 
     share, lateral, damping = _damped(linear, fastest)
     if share < 1.0:
         limited_by = f"damping of the yawing oscillation ({damping:.2f}), at {share * fastest:.2g} rad/s"
+    max_bank = _steepest(linear, trim, max_bank)
     for share_of_pitch in np.geomspace(1.0, 0.3, 8).tolist():
         pitching = _pitching(linear, trim, stall, max_bank, share_of_pitch)
         eigenvalues = eigenvalues_of(_closed_pitching(linear, pitching))
@@ -72,8 +78,8 @@ def designed(linear: Linear, trim: Mapping[str, float], stall: float, max_bank: 
     room = 1.0 - abs(trim["aileron"])
     limit = {
         "bank-rad": max_bank,
-        "aileron-rad": 0.95 * room,
-        "rudder-rad": 0.8 * (1.0 - abs(trim["rudder"])),
+        "aileron-rad": _AILERON * room,
+        "rudder-rad": _RUDDER * (1.0 - abs(trim["rudder"])),
         "elevator-rad": 0.95 * (1.0 - abs(trim["elevator"])),
         "climb-mps": 0.06 * linear.airspeed,
         "angle-of-attack-rad": max(0.9 * stall, linear.pitch + math.radians(2.0)),
@@ -85,6 +91,7 @@ def designed(linear: Linear, trim: Mapping[str, float], stall: float, max_bank: 
         bandwidth,
         limited_by,
         damping,
+        max_bank,
     )
 
 
@@ -102,6 +109,30 @@ def _fastest(linear: Linear, trim: Mapping[str, float], wanted: float) -> tuple[
         (by_lag, f"the aileron's lag ({linear.aileron.lag:.2g} s)"),
     ]
     return min(choices)
+
+
+def _steepest(linear: Linear, trim: Mapping[str, float], max_bank: float) -> float:
+    """The steepest turn, rad, up to this one, that aileron and rudder hold to both sides with little sideslip.
+
+    Raises `RefusalError` where there is none.
+    """
+    rows = [_P, _R]
+    surfaces = np.column_stack([linear.aileron.effect[rows], linear.rudder.effect[rows]])
+    if abs(linear.rudder.effect[_R]) < _NO_RUDDER:
+        return max_bank
+    most = _IN_TURN * np.array([_AILERON * (1.0 - abs(trim["aileron"])), _RUDDER * (1.0 - abs(trim["rudder"]))])
+    sideslip = np.outer(np.linspace(-_SIDESLIP, _SIDESLIP, 9), linear.beta[rows])
+
+    def is_held(bank: float, side: float) -> bool:
+        turning = GRAVITY / linear.airspeed * math.sin(bank)
+        moments = turning * (side * linear.yawing[rows] + math.tan(bank) * linear.pitching[rows]) + sideslip
+        return bool((most >= np.abs(np.linalg.solve(surfaces, moments.T)).T).all(axis=1).any())
+
+    banks = np.linspace(max_bank, min(max_bank, _LEAST_BANK), 60).tolist()
+    for bank in banks:
+        if is_held(bank, 1.0) and is_held(bank, -1.0):
+            return float(bank)
+    raise RefusalError("design", f"aileron and rudder do not hold a turn of {math.degrees(banks[-1]):.0f} deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +162,7 @@ def _lateral(linear: Linear, omega: float) -> _Lateral:
         "sideslip-i": 0.0,
         "sideslip-limit": 0.3,
     }
-    if abs(N_dr) > 1e-3:
+    if abs(N_dr) > _NO_RUDDER:
         A, _ = linear.lateral()
         frequency, damping = oscillation(eigenvalues_of(A))
         rudder["rudder-from-aileron"] = _within(-N_da / N_dr, 0.6)

@@ -33,6 +33,7 @@ _CLEAN = ("gear/gear-cmd-norm", "gear/gear-pos-norm", "fcs/flap-cmd-norm", "fcs/
 )  # fmt: skip
 STEADY = 2e-3  # m/s^2 and rad/s^2: what is left of the accelerations in a trim
 _STARTER = 5.0  # s
+_ASIDE, _ASIDE_FOR = 0.2, 0.3  # of the commands, and s
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +132,8 @@ class WindTunnel:
         """Of all engines together, forwards, N."""
         return POUND * self.fdm["forces/fbx-prop-lbs"]
 
-    def settled(self, least: float = 0.2, longest: float = 6.0, tolerance: float = 3e-5) -> Array:
-        """The accelerations once they rest. Raises `NotFiniteError`."""
+    def settled(self, least: float = 0.2, longest: float = 30.0, tolerance: float = 3e-5) -> Array:
+        """The accelerations once they rest; a heavy propeller takes its time. Raises `NotFiniteError`."""
         last, time = self.accelerations + math.inf, 0.0
         while True:
             self.run(least)
@@ -147,6 +148,16 @@ class WindTunnel:
         self.command()
         self.place(sideslip, rates, faster)
         return self.settled()
+
+    def approached(self) -> Array:
+        """The accelerations in the setting, its surfaces come to from the same side, whatever they did before.
+
+        So play in the controls does not make the accelerations depend on the past.
+        """
+        with self.changed(elevator=_ASIDE, aileron=_ASIDE, rudder=_ASIDE):
+            self.command()
+            self.run(_ASIDE_FOR)
+        return self.at()
 
     @contextmanager
     def changed(self, **change: float) -> Iterator[None]:
@@ -192,7 +203,7 @@ class WindTunnel:
         """
         nudges = np.array([getattr(_NUDGE, name) for name in unknowns])
         farthest = np.array([getattr(_FARTHEST, name) for name in unknowns])
-        weight, now = 1e-4, self.at()[list(rows)]
+        weight, now = 1e-4, self.approached()[list(rows)]
         for _ in range(rounds):
             if np.abs(now).max() < tolerance:
                 break
@@ -208,7 +219,7 @@ class WindTunnel:
                 self.setting = before._replace(
                     **{name: min(max(v, getattr(_LEAST, name)), getattr(_RANGE, name)) for name, v in moved.items()}
                 )
-                new = self.at()[list(rows)]
+                new = self.approached()[list(rows)]
                 if np.linalg.norm(new) < np.linalg.norm(now):
                     now, weight = new, max(weight / 10.0, 1e-6)
                     break
@@ -222,7 +233,7 @@ class WindTunnel:
         if getattr(self.setting, name) + nudge > getattr(_RANGE, name):
             nudge = -nudge
         with self.changed(**{name: nudge}):
-            return (self.at()[list(rows)] - now) / nudge
+            return (self.approached()[list(rows)] - now) / nudge
 
     def trim(self) -> float:
         """Finds steady level flight from a setting near it; returns the largest acceleration that is left."""
