@@ -4,7 +4,7 @@ In this order: trimming a model, engaging its inner loop, flying it.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -175,22 +175,20 @@ class SixDof:
         fdm = load(self.airframe, self.step, self.errors)
         if adopted := aircraft.adopted(self.airframe):
             self._engage_adopted(fdm, adopted, start, air)
-            return _SixDofFlying(
-                fdm, self.step, start, air, limits.stall, _blower(fdm, air) if len(air.gusts) else None
-            )
+            return _SixDofFlying(fdm, self.step, start, air, limits.stall, _gusts(fdm, air) if len(air.gusts) else None)
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:
             allowed = f"{self.airframe.name} flies from {limits.slowest:g} to {limits.fastest:g} m/s"
             raise PlantError("start.airspeed", f"{error}; {allowed}") from None
         engage(fdm, trimmed, start, self.rate_trim)
-        blow = _blower(fdm, air) if len(air.gusts) else None
-        if blow:  # the first gust is there before the surfaces answer it
-            blow()
+        gusts = _gusts(fdm, air) if len(air.gusts) else None
+        if gusts:  # the first gust is there before the surfaces answer it
+            next(gusts)
             _connect(fdm, False)
             fdm.run_ic()
             _connect(fdm, True)
-        return _SixDofFlying(fdm, self.step, start, air, limits.stall, blow)
+        return _SixDofFlying(fdm, self.step, start, air, limits.stall, gusts)
 
     def _engage_adopted(self, fdm: Fdm, adopted: Mapping[str, Any], start: Start, air: Air) -> None:
         """Trims an adopted model in the wind tunnel, hands it to its inner loop, and lets it fly."""
@@ -213,8 +211,8 @@ class SixDof:
         tunnel.release()
 
 
-def _blower(fdm: Fdm, air: Air) -> Callable[[], None]:
-    """A function that puts the next gust and rotation of the air into JSBSim; to be called before each `run()`.
+def _gusts(fdm: Fdm, air: Air) -> Iterator[None]:
+    """Puts the next gust and rotation of the air into JSBSim; `next` of it is to be called before each `run()`.
 
     The values are those at the end of the step that `run()` then makes. JSBSim's own steady wind is the
     horizontal wind at the start, in which the aircraft was trimmed: gusts are the difference to it.
@@ -233,19 +231,19 @@ def _blower(fdm: Fdm, air: Air) -> Callable[[], None]:
     blocks = (
         table[k : k + 1000].tolist() for k in range(0, len(table), 1000)
     )  # in blocks: as lists, the whole table would take four times its memory
-    rows, sin, cos = chain.from_iterable(blocks), math.sin, math.cos
-
-    def blow() -> None:
-        above, psi = height() - level, heading()
-        W_x, W_y, W_z, p, q, r_x, r_y = next(rows)
-        set_x(W_x + shear_x * above)
-        set_y(W_y + shear_y * above)
+    sin, cos, is_sheared = math.sin, math.cos, bool(shear_x or shear_y)
+    for W_x, W_y, W_z, p, q, r_x, r_y in chain.from_iterable(blocks):
+        if is_sheared:
+            above = height() - level
+            W_x, W_y = W_x + shear_x * above, W_y + shear_y * above
+        psi = heading()
+        set_x(W_x)
+        set_y(W_y)
         set_z(W_z)
         roll(p)
         pitch(q)
         yaw(r_y * cos(psi) - r_x * sin(psi))
-
-    return blow
+        yield
 
 
 class _SixDofFlying:
@@ -256,11 +254,11 @@ class _SixDofFlying:
         start: Start,
         air: Air,
         stall: float,
-        blow: Callable[[], None] | None,
+        gusts: Iterator[None] | None,
     ) -> None:
         self.fdm = fdm
         self._run: Callable[[], bool] = fdm.run
-        self._blow = blow
+        self._gusts = gusts
         self._readers = [node(fdm, name).get_double_value for name in _READ]
         self._velocity_north, self._velocity_east = self._readers[2:4]
         self._command = node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
@@ -272,17 +270,17 @@ class _SixDofFlying:
 
     def advance(self, heading_rate: float, period: float) -> None:
         self._command(heading_rate)
-        run, blow, steps = self._run, self._blow, round(period / self._step)
-        if blow is None:
+        run, gusts, steps = self._run, self._gusts, round(period / self._step)
+        if gusts is None:
             for _ in range(steps - 1):
                 run()
             before = self._heading()
         else:
             for _ in range(steps - 1):
-                blow()
+                next(gusts)
                 run()
             before = self._heading()
-            blow()
+            next(gusts)
         run()
         self.state = state = self._read(before)
         if not (
