@@ -85,6 +85,12 @@ def plant_of(flight: Flight) -> Plant:
     return PLANTS[flight.plant].make(setup_of(flight))
 
 
+def command_delay(flight: Flight) -> tuple[int, float]:
+    """How late the plant gets the commands: so many whole guidance periods, and a part of one, s."""
+    whole, steps = divmod(round(flight.errors.command_delay / flight.step), round(flight.guidance_period / flight.step))
+    return whole, steps * flight.step
+
+
 def context_of(flight: Flight) -> Context:
     """What the flight's law knows before it flies; the response of an airframe that is not identified is None."""
     response = None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from autopilot.guidance import Context, Guidance, Law, LawStep, Observation, Telling, started
 from harness.checks import problems
 from harness.feasibility import margins_in_flight
-from harness.flight import Flight, air_of, context_of, plant_of
+from harness.flight import Flight, air_of, command_delay, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, heading_in, perfect_estimator
 from harness.log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
 from harness.plants.late import Late
@@ -45,8 +45,7 @@ def simulate(
     known = context or context_of(flight)
     flying = (plant or plant_of(flight)).start(flight.start, air_of(flight))
     if flight.errors.command_delay:
-        whole, steps = divmod(round(flight.errors.command_delay / flight.step), round(period / flight.step))
-        flying = Late(flying, whole, steps * flight.step)
+        flying = Late(flying, *command_delay(flight))
 
     table, rows = bytearray((last + 1) * _ROW_BYTES), 0
     outcome, reason = Outcome.COMPLETED, ""

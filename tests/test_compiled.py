@@ -55,7 +55,9 @@ def anywhere(seed: int) -> Flight:
     if draw.random() < 0.4:
         segment = Segment(from_=2.0, to=8.0, acceleration=draw.uniform(0.0, 0.3), turn_rate=draw.uniform(-0.1, 0.1))
         target = replace(target, speed=draw.uniform(0.0, 4.0), heading=draw.uniform(-3.0, 3.0), segments=(segment,))
-    errors = Errors(wind=draw.choice([0.0, 0.5]), course_noise=draw.choice([0.0, 0.01]), airspeed_scale=1.0)
+    late = draw.choice([0.0, 0.0, 0.05, 0.1, 0.12, 0.5])  # whole periods, and parts of one
+    noise = draw.choice([0.0, 0.01])
+    errors = Errors(wind=draw.choice([0.0, 0.5]), course_noise=noise, airspeed_scale=1.0, command_delay=late)
     estimator = replace(FLIGHT.estimator, turn_rate=draw.choice(["known", "unknown"]))
     position = (draw.uniform(-600.0, 600.0), draw.uniform(-600.0, 600.0))
     return Flight(
@@ -176,7 +178,6 @@ def test_both_engines_make_the_same_rows_with_a_law_of_ones_own_whatever_it_rais
     ("settings", "why"),
     [
         (["plant=sixdof"], "on sixdof: the plant sixdof has no closed form"),
-        (["errors.command_delay_s=0.1"], "on kinematic: errors.command_delay_s delays the command"),
         (["law.name=lq_orbit", "law.gains=slow"], "the law lq_orbit on kinematic: it holds "),
     ],
 )

@@ -12,7 +12,7 @@ from autopilot.response import Delay, Piece
 from harness import loop
 from harness.compiled.kernel import Kernel, NotCompiledError, is_installed, kernel, refuse
 from harness.compiled.loop import COMPLETED, TARGET_LOST, UNUSUAL, at_once, flown, in_pieces, moving
-from harness.flight import Flight, air_of, context_of, plant_of
+from harness.flight import Flight, air_of, command_delay, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, perfect_estimator
 from harness.log import COLUMNS, FlightLog
 from harness.plants.level import InPieces, Level, MovingInPieces
@@ -71,13 +71,12 @@ class _Ready(NamedTuple):
     air: Air
     now: tuple[float, ...]
     states: tuple[float, ...]
+    late: tuple[Array, int, Array]  # commands, and how late they are: see `flown`
     line: tuple[Any, ...]  # of `in_pieces`
 
 
 def _ready(flight: Flight) -> _Ready:
     """Raises `NotCompiledError` for a flight that has no closed form, or whose law cannot start."""
-    if flight.errors.command_delay:
-        raise NotCompiledError("errors.command_delay_s delays the command")
     air = air_of(flight)
     flying = plant_of(flight).start(flight.start, air)
     if not isinstance(flying, Level):
@@ -86,13 +85,15 @@ def _ready(flight: Flight) -> _Ready:
         law = loop.begun(flight.law, context_of(flight))
     except End as end:
         raise NotCompiledError(str(end)) from None
+    whole, part = command_delay(flight)
+    parts = (part, flight.guidance_period - part) if part else (flight.guidance_period,)
+    late = np.empty(flight.periods), whole, np.array(parts)
     if not isinstance(flying.move, MovingInPieces):
-        return _Ready(flown(law, at_once(flying.move)), air, tuple(flying.moved), (), ())
+        return _Ready(flown(law, at_once(flying.move)), air, tuple(flying.moved), (), late, ())
     motion = flying.move.motion
     step = in_pieces(motion.commanded, motion.piece, motion.ended)
-    line = _line(motion, flight.guidance_period, flight.periods)
-    given = np.empty(flight.periods + 1)
-    return _Ready(flown(law, step), air, tuple(flying.moved), motion.states, (given, *line))
+    line = np.empty(flight.periods * len(parts)), *_line(motion, parts, flight.periods)
+    return _Ready(flown(law, step), air, tuple(flying.moved), motion.states, late, line)
 
 
 def _flown(
@@ -107,7 +108,8 @@ def _flown(
         period, flight.start.altitude, flight.start.airspeed, *map(float, instruments.wind), instruments.scale,
         flight.metrics.monitoring_range or math.inf,
     )  # fmt: skip
-    before = target, seen, *ready.air.sampled(period, last), instruments.turns(last + 1), told, ready.line
+    air, drift = ready.air.sampled(ready.late[-1], last)
+    before = target, seen, air, drift, instruments.turns(last + 1), told, ready.late, ready.line
     done, state, ended = 0, (ready.now, ready.states), COMPLETED
     outcome, reason = Outcome.COMPLETED, ""
 
@@ -185,8 +187,8 @@ def _known(flight: Flight, target: Array) -> tuple[Array, list[tuple[float, ...]
 
 
 @lru_cache(maxsize=16)
-def _line(motion: InPieces, period: float, last: int) -> tuple[Array | NDArray[np.int64], ...]:
-    """What `in_pieces` is told: where the pieces of each period begin, and what they are.
+def _line(motion: InPieces, parts: tuple[float, ...], last: int) -> tuple[Array | NDArray[np.int64], ...]:
+    """What `in_pieces` is told: where the pieces of each part of the periods begin, and what they are.
 
     First of each piece the row of the command that acts in it, -1 for none yet, and its kind; then of each kind its
     length and its rows.
@@ -195,8 +197,8 @@ def _line(motion: InPieces, period: float, last: int) -> tuple[Array | NDArray[n
     sources: list[int] = []
     kinds: list[int] = []
     known: dict[int, tuple[int, Piece]] = {}
-    for k in range(last):
-        for command, length in delay.pieces(k + 1.0, period):  # in place of a command its number
+    for number in range(last * len(parts)):
+        for command, length in delay.pieces(number + 1.0, parts[number % len(parts)]):  # for a command its number
             count, piece = motion.of_length(length)
             kind, _ = known.setdefault(length, (len(known), piece))
             sources += [int(command) - 1] * count

@@ -26,8 +26,8 @@ Step = Callable[[Motion, States, float, float, int, Any], tuple[Motion, States]]
 def at_once(move: Move) -> Step:
     """A plant without memory."""
 
-    def step(now: Motion, states: States, rate: float, period: float, k: int, line: Any) -> tuple[Motion, States]:
-        return move(now, rate, period), states
+    def step(now: Motion, states: States, rate: float, length: float, part: int, line: Any) -> tuple[Motion, States]:
+        return move(now, rate, length), states
 
     return step
 
@@ -37,14 +37,14 @@ def in_pieces(
     piece: Callable[[Motion, States, float, Piece], tuple[Motion, States]],
     ended: Callable[[Motion, States, float, float], Motion],
 ) -> Step:
-    """A plant behind a delay: `line` says which pieces each period has, and which command acts in each."""
+    """A plant behind a delay: `line` says which pieces each part has, and which command acts in each."""
 
-    def step(now: Motion, states: States, rate: float, period: float, k: int, line: Any) -> tuple[Motion, States]:
+    def step(now: Motion, states: States, rate: float, length: float, part: int, line: Any) -> tuple[Motion, States]:
         given_so_far, begins, sources, kinds, lengths, outputs, integrals, ends, airspeeds = line
         given = commanded(rate)
-        given_so_far[k] = given
+        given_so_far[part] = given
         acts = 0.0
-        for i in range(begins[k], begins[k + 1]):
+        for i in range(begins[part], begins[part + 1]):
             acts = given_so_far[sources[i]] if sources[i] >= 0 else 0.0
             p = kinds[i]
             rows = Piece(lengths[p], outputs[p], integrals[p], ends[p], airspeeds[p])
@@ -76,14 +76,17 @@ def flown(law: LawStep, step: Step) -> Callable[..., Any]:
     """The loop with this law and this plant."""
 
     def fly(
-        table: Any, target: Any, estimate: Any, air: Any, drift: Any, noise: Any, told: Any, line: Any, rows: Any,
-        fixed: Any, now: Any, states: States,
+        table: Any, target: Any, estimate: Any, air: Any, drift: Any, noise: Any, told: Any, late: Any, line: Any,
+        rows: Any, fixed: Any, now: Any, states: States,
     ) -> Any:  # fmt: skip
         """Fills the rows of the table from `first` on, until `end`; a flight ends with the row `last`.
 
-        Returns how it ended, the number of rows that are filled, and from what it goes on.
+        `late` is a place for the commands, the number of periods by which they are late, and the lengths of the parts
+        of a period, s: a period has two where the next command arrives within it. Returns how it ended, the number of
+        rows that are filled, and from what it goes on.
         """
         first, end, last = rows
+        commands, whole, parts = late
         period, altitude, nominal_airspeed, W_x, W_y, scale, monitoring_range = fixed
         x, y, v_a, psi, rate, bank, roll_rate, bank_command = now
         moved = Motion(x, y, v_a, psi, rate, bank, roll_rate, bank_command)
@@ -123,8 +126,12 @@ def flown(law: LawStep, step: Step) -> Callable[..., Any]:
             if monitoring_range < math.inf and math.hypot(x_r, y_r) > monitoring_range:
                 return TARGET_LOST, k + 1, now, states
             if k < last:
-                moved, states = step(moved, states, guidance.heading_rate, period, k, line)
-                moved = carried(moved, drift[k, 0], drift[k, 1])
+                commands[k] = guidance.heading_rate
+                for i in range(len(parts)):
+                    given, part = k - whole - (len(parts) - 1 - i), k * len(parts) + i
+                    rate = commands[given] if given >= 0 else 0.0
+                    moved, states = step(moved, states, rate, parts[i], part, line)
+                    moved = carried(moved, drift[part, 0], drift[part, 1])
                 x, y, v_a, psi, rate, bank, roll_rate, bank_command = moved
                 now = (x, y, v_a, psi, rate, bank, roll_rate, bank_command)
         return COMPLETED, end, now, states

@@ -64,17 +64,17 @@ class Air:
         north, east = (self._way[end] - self._way[begin]).tolist()
         return north, east
 
-    def sampled(self, period: float, count: int) -> tuple[Array, Array]:
-        """The air every `period` seconds: `horizontal` with the velocity down, and the way in each of `count` periods.
+    def sampled(self, parts: Array, count: int) -> tuple[Array, Array]:
+        """The air in `count` periods, of which each has parts of these lengths, s.
 
-        Of shapes (count + 1, 3), m/s, and (count, 2), m.
+        `horizontal` with the velocity down at each period, m/s, and the way in each part, m: of shapes (count + 1, 3)
+        and (count * len(parts), 2).
         """
-        W_x, W_y = self.steady
-        velocity, way = np.zeros((count + 1, 3)), np.zeros((count, 2))
+        lengths = np.tile(parts, count)
+        velocity, way = np.zeros((count + 1, 3)), np.zeros((len(lengths), 2))
         if len(self.gusts):
-            apart = round(period / self.step)
-            velocity[:] = self.gusts[: count * apart + 1 : apart]
-            way[:] = np.diff(self._way[: count * apart + 1 : apart], axis=0)
-        velocity[:, 0] += W_x
-        velocity[:, 1] += W_y
-        return velocity, way + np.array([W_x * period, W_y * period])
+            steps = np.concatenate([[0], np.cumsum(np.tile([round(part / self.step) for part in parts], count))])
+            velocity[:] = self.gusts[steps[:: len(parts)]]
+            way[:] = np.diff(self._way[steps], axis=0)
+        velocity[:, :2] += self.steady
+        return velocity, way + np.multiply.outer(lengths, self.steady)
