@@ -311,18 +311,19 @@ class _SixDofFlying:
 
     def _read(self, before: float) -> State:
         """The state now. `before` is the heading one step ago: the heading rate is the mean over that step."""
-        n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z, *others = [
-            get() for get in self._readers
-        ]
-        *surfaces, gust_x, gust_y, gust_z = others
-        W_x, W_y = self._wind
-        gust_x, gust_y = self._at_start[0] + FT * gust_x, self._at_start[1] + FT * gust_y
-        heading = math.atan2(FT * v_e - W_y, FT * v_n - W_x)
+        (
+            n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z,
+            aileron, elevator, rudder, throttle, gust_x, gust_y, gust_z,
+        ) = [get() for get in self._readers]  # fmt: skip
+        (W_x, W_y), (start_x, start_y) = self._wind, self._at_start
+        v_n, v_e = FT * v_n, FT * v_e
+        heading = math.atan2(v_e - W_y, v_n - W_x)
         return State._make(
             (
-                self._north + FT * n, self._east + FT * e, FT * v_n, FT * v_e, FT * V,
+                self._north + FT * n, self._east + FT * e, v_n, v_e, FT * V,
                 heading, wrap(heading - before) / self._step, phi, p, FT * h, FT * v_d, theta, psi, q, r,
-                phi_c, alpha, beta, GRAVITY * N_y, N_z, *surfaces, gust_x, gust_y, FT * gust_z,
+                phi_c, alpha, beta, GRAVITY * N_y, N_z, aileron, elevator, rudder, throttle,
+                start_x + FT * gust_x, start_y + FT * gust_y, FT * gust_z,
             )
         )  # fmt: skip
 
