@@ -33,7 +33,7 @@ LEFT_OUT: Mapping[str, str] = MappingProxyType(
         "flybots 2.0.0": "asks for Python 3.12; this Python is 3.11",
         "gym-jsbsim 0.6.7": "installs, but cannot read the list of properties of JSBSim 1.3.3",
         "gym-pybullet-drones": "is not on the package index",
-        "last-letter 2.103.0": "comes as C++ source, whose build did not find Eigen and then Boost",
+        "last-letter 2.103.0": "comes as C++ source, whose build fetches more sources from the network",
         "pyf16 0.1.1": "its package has no aerodynamic model to load",
         "uniflight 1.0.4": "an engine for equations of motion, without an aircraft",
     }

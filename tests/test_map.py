@@ -140,15 +140,24 @@ def mapped(file: Path, out: Path, *words: object, workers: int = 0) -> str:
     return done.output
 
 
+@pytest.mark.parametrize("resolution", [10, 12, 25, 50])
+def test_a_coarse_map_is_whole_unless_it_is_told_to_stop_earlier(file: Path, resolution: int) -> None:
+    space = Space(read_settings(file), [dimension(X, "--x"), dimension(Y, "--y")])
+    most = map_of(space, question("converged"), resolution=resolution).flights
+    assert most <= (BorderSearch.of(resolution).side + 1) ** 2
+    for name, planted in PLANTED.items():
+        assert len(located(planted, resolution).answers) <= most, name
+
+
 def test_a_map_is_the_same_on_any_number_of_workers_and_resumes(file: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     text = mapped(file, first, "--flights", 130)
     assert "121 flown" in text
     assert "not located; the same command with more --flights goes on" in text
-    whole = mapped(file, second, "--flights", 441, workers=2)
+    whole = mapped(file, second, workers=2)
     assert "stopped" not in whole
     total = len(harness.load_results(second))
-    assert f"{total - 121} flown, 121 earlier, 0 failed" in mapped(file, first, "--flights", 441)
+    assert f"{total - 121} flown, 121 earlier, 0 failed" in mapped(file, first)
     for name in ("points.csv", "border.csv", "map.svg"):
         assert (first / name).read_bytes() == (second / name).read_bytes()
     with (first / "points.csv").open(newline="") as rows:
@@ -161,7 +170,7 @@ def test_a_map_is_the_same_on_any_number_of_workers_and_resumes(file: Path, tmp_
 
 def test_a_map_of_flights_agrees_with_their_full_grid(file: Path, tmp_path: Path) -> None:
     space = Space(read_settings(file), [dimension(X, "--x"), dimension(Y, "--y")])
-    found = flown(map_of(space, question("converged"), resolution=20, flights=441), tmp_path / "out")
+    found = flown(map_of(space, question("converged"), resolution=20), tmp_path / "out")
     (panel,) = found.panels
     filled = panel.border.filled()
     full = {}

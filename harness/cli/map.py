@@ -30,7 +30,12 @@ _PICTURES = ("map.png", PICTURE)
     "--resolution", type=int, default=200, show_default=True, metavar="N", help="Locate borders to 1/N of a range."
 )
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="The folder of the results.")
-@click.option("--flights", type=int, metavar="N", help="At most N flights.  [default: a tenth of the full grid's]")
+@click.option(
+    "--flights",
+    type=int,
+    metavar="N",
+    help="At most N flights.  [default: a tenth of the full grid's, or four times the lattice's]",
+)
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")

@@ -28,7 +28,8 @@ CONVERGED = "converged"  # whether a flight has a convergence time
 POINTS, BORDER = "points.csv", "border.csv"
 MOST_PANELS = 12
 LEAST, MOST = 10, 2000  # of the resolution
-_SHARE = 10  # of the full grid's flights: a search takes one in so many at most, unless told
+_SHARE = 10  # of the full grid's flights: a search takes one in so many at most, unless told,
+_ROUNDS = 4  # or so many times its first round, where that is more
 _DIGITS = 7  # of a setting: steps of a map are small
 _PREDICTED = 9  # points along each side, between which the predicted margin is interpolated
 
@@ -217,7 +218,7 @@ def map_of(space: Space, asked: Question, *, resolution: int, flights: int | Non
     first = sum(len(panel.border.first) * len(panel.conditions) for panel in made.panels)
     if flights is not None and flights < first:
         raise SearchError(f"--flights is {flights}, must be {first} at least, which is the first round")
-    made.flights = flights or max(first, made.full // _SHARE)
+    made.flights = flights or max(made.full // _SHARE, min(made.full, _ROUNDS * first))
     return made
 
 
