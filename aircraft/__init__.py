@@ -177,7 +177,13 @@ def limits(airframe: Path) -> Limits:
     if is_recorded(airframe):
         flown = {name: _recorded_limit(airframe, name) for name in Limits._fields if name != "stall"}
         return Limits(**flown, stall=math.inf)
-    published, loop = _numbers(airframe / "airframe.toml"), _numbers(airframe / "inner_loop.toml")
+    files = (airframe / "airframe.toml", airframe / "inner_loop.toml")
+    return _limits(*files, tuple(map(_changed, files)))
+
+
+@lru_cache(maxsize=64)  # each flight of a run asks
+def _limits(data: Path, inner_loop: Path, changed: tuple[tuple[int, int] | None, ...]) -> Limits:
+    published, loop = _numbers(data), _numbers(inner_loop)
     return Limits(
         slowest=published("envelope", "V_min"),
         design_airspeed=published("envelope", "V_design"),

@@ -27,17 +27,17 @@ class Instruments:
         errors = flight.errors
         self.wind = errors.estimated(flight.wind.steady)
         self.scale, self._deviation = errors.airspeed_scale, errors.course_noise
-        self._noise = stream(flight.seed, "course")
+        self._noise = stream(flight.seed, "course") if errors.course_noise else None
 
     def turns(self, steps: int) -> NDArray[np.float64]:
         """The errors of the course at so many guidance steps, rad; none where the course is exact."""
-        return self._deviation * self._noise.standard_normal(steps if self._deviation else 0)
+        return self._deviation * self._noise.standard_normal(steps) if self._noise else np.empty(0)
 
     def read(self, state: State) -> State:
         """The aircraft's state as it is measured at the next guidance step."""
         if self.scale != 1.0:
             state = state._replace(airspeed=self.scale * state.airspeed)
-        if self._deviation:
+        if self._noise:
             turn = self._deviation * self._noise.standard_normal()
             v_x, v_y = turned(state.velocity_north, state.velocity_east, turn)
             state = state._replace(velocity_north=v_x, velocity_east=v_y, heading=heading_in(self.wind, v_x, v_y))

@@ -176,12 +176,13 @@ def _moving(target: Target, period: float, last: int) -> Array:
 def _known(flight: Flight, target: Array) -> tuple[Array, list[tuple[float, ...]] | None]:
     """The target as the law knows it at each row, and the rows of an `Estimation`."""
     if not flight.estimator.filters:
-        known = perfect_estimator(flight.estimator)(0, TargetState(*target.T))
-        return np.column_stack(np.broadcast_arrays(*known)), None
+        truth = TargetState(*target.T)
+        known = perfect_estimator(flight.estimator)(0, truth)
+        return target if known is truth else np.column_stack(np.broadcast_arrays(*known)), None
     estimation = Estimation(flight, flight.target.start())
-    truth = TargetState(0.0, 0.0, 0.0, 0.0)  # not used
+    nothing = TargetState(0.0, 0.0, 0.0, 0.0)  # not used
     try:
-        return np.array([estimation.at(k, truth) for k in range(len(target))]), estimation.rows
+        return np.array([estimation.at(k, nothing) for k in range(len(target))]), estimation.rows
     except End as end:
         raise NotCompiledError(str(end)) from None
 
