@@ -16,17 +16,18 @@ from harness.adoption.adoption import STANDARD, STEP, Adoption, Wish, motion, wr
 from harness.adoption.design import designed
 from harness.adoption.linear import COMMANDS, linearised
 from harness.adoption.manoeuvres import circled, law_of, turned
-from harness.adoption.model import Original, named, source, writers
+from harness.adoption.model import Original, faults_of_engines, integrator_after, named, source, writers
 from harness.adoption.refusal import RefusalError
 from harness.child import MEMORY, ChildError, limited
+from harness.fence import Tag
 from harness.files import make_folder, write_text
 from harness.identification.identify import identify
-from harness.plants.model import FT, SLUG, Fdm, ModelError, check_body, load, unknown
+from harness.plants.model import FT, SLUG, Fdm, ModelError, check_body, fill_empty_tanks, load, parsed, unknown
 from harness.plants.plant import End, PlantError
 from harness.plants.turn import GRAVITY
-from harness.plants.wind_tunnel import STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
+from harness.plants.wind_tunnel import POUND, STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
 
-SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0)  # times that of the lift coefficient below
+SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0, 2.8)  # times that of the lift coefficient below
 LIFT_COEFFICIENT = 0.5
 SECONDS = 60.0  # that all stages together may take
 _THROTTLES = (0.15, 0.4, 0.65, 0.9)
@@ -34,6 +35,10 @@ _MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # of
 
 _IN_TRIM = ("linearise", "design", "90 deg", "circle")  # stages that another trim may pass
 
+_AXES = (
+    "{:.2g} m/s^2 forwards", "{:.2g} m/s^2 sidewards", "{:.2g} m/s^2 downwards",
+    "{:.2g} rad/s^2 in roll", "{:.2g} rad/s^2 in pitch", "{:.2g} rad/s^2 in yaw",
+)  # fmt: skip
 Found = tuple[Adoption, str]
 _FILES = ("{name}.xml", "airframe.toml", "inner_loop.toml", "identified.toml", "circle.toml")
 
@@ -119,6 +124,7 @@ def _load(a: Adoption) -> Found:
     throttles = tuple(f"fcs/throttle-cmd-norm[{i}]" for i in range(max(1, engines)))
     throttles += cockpit.throttles(a.names - set(a.writers), engines)
     controls = Controls.of({**_table(replace(STANDARD, throttles=throttles)), **(a.wish.controls or {})})
+    filled = ", empty tanks filled" if fill_empty_tanks(fdm) else ""
     fdm.run_ic()
     check_body(fdm)
     mass, area = SLUG * fdm["inertia/mass-slugs"], FT**2 * fdm["metrics/Sw-sqft"]
@@ -129,7 +135,7 @@ def _load(a: Adoption) -> Found:
         chord=FT * fdm["metrics/cbarw-ft"],
     )  # fmt: skip
     made = f"{len(invented)} properties invented, {len(told)} as in FlightGear"
-    return a, f"{made}, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
+    return a, f"{made}{filled}, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
 
 
 def _told(a: Adoption, fdm: Fdm) -> dict[str, str]:
@@ -169,14 +175,35 @@ def _engine(a: Adoption) -> Found:
     for throttle in (0.2, 1.0):
         tunnel.setting = tunnel.setting._replace(throttle=throttle)
         tunnel.command()
-        tunnel.settled(longest=10.0)
+        tunnel.settled()
         thrusts.append(tunnel.thrust)
     low, high = thrusts
-    if high - low < 1e-3 * a.mass * GRAVITY:
-        told = f"throttle has no effect: thrust {low:.3g} N at 0.2 and {high:.3g} N at 1"
-        raise RefusalError("engine", f"{told}{_whose(a, a.controls.throttles[0])}")
-    told = f"{tunnel.engines} running, thrust {low:.3g} N at throttle 0.2, {high:.3g} N at 1"
+    weight = a.mass * GRAVITY
+    if high - low < 1e-3 * weight:
+        much = "no" if high - low < 1e-4 * weight else "too little"
+        told = f"throttle has {much} effect: thrust {low:.3g} N at 0.2 and {high:.3g} N at 1"
+        causes = dict.fromkeys([*faults_of_engines(_model(a)), *_held_back(tunnel)])
+        way_out = _whose(a, a.controls.throttles[0])
+        raise RefusalError("engine", "; ".join([told, *causes]) if causes else f"{told}{way_out}")
+    refilled = ", its tanks refilled while it burns" if tunnel.is_refuelled else ""
+    told = f"{tunnel.engines} running{refilled}, thrust {low:.3g} N at throttle 0.2, {high:.3g} N at 1"
     return replace(a, engine=told), told
+
+
+def _model(a: Adoption) -> Tag:
+    return parsed(aircraft.model(a.folder))
+
+
+def _held_back(tunnel: WindTunnel) -> Iterator[str]:
+    """What keeps the engines from pushing forwards at full throttle."""
+    fdm = tunnel.fdm
+    for i in range(tunnel.engines):
+        limiter, power = (f"propulsion/engine[{i}]/{name}" for name in ("ielu_intervent", "power-hp"))
+        if not unknown(fdm, [limiter, power]) and fdm[limiter]:
+            yield f"the torque limiter of engine {i} holds it at {fdm[power]:.3g} hp"
+    across = POUND * math.hypot(fdm["forces/fby-prop-lbs"], fdm["forces/fbz-prop-lbs"])
+    if across > 10.0 * abs(tunnel.thrust):
+        yield f"the engines push across the flight, by {across:.3g} N"
 
 
 def _controls(a: Adoption) -> Found:
@@ -200,8 +227,12 @@ def _controls(a: Adoption) -> Found:
 
 
 def _whose(a: Adoption, name: str) -> str:
-    writer = a.writers.get(name.replace("[0]", ""))
-    return f"; {writer} of the model writes {name}, too" if writer else ": use --controls"
+    """The component of the model that makes a command do nothing, or the way out."""
+    if writer := a.writers.get(name.replace("[0]", "")):
+        return f"; {writer} of the model writes {name}, too"
+    if integrator := integrator_after(_model(a), name):
+        return f"; {integrator} of the model comes after it, as when a rate is commanded: use --controls"
+    return ": use --controls"
 
 
 def _commands(a: Adoption) -> list[str]:
@@ -226,7 +257,10 @@ def _trim(a: Adoption) -> Found:
     best, why = math.inf, ""
     for i, speed in enumerate(speeds, 1):
         tunnel.start = replace(a.start, airspeed=speed)
-        left, reason = _trimmed(tunnel)
+        try:
+            left, reason = _trimmed(tunnel)
+        except NotFiniteError as error:
+            left, reason, tunnel = math.inf, str(error), _tunnel(a)
         if not reason:
             s = tunnel.setting
             return replace(a, start=tunnel.start, setting=s, speeds=speeds[i:]), (
@@ -234,7 +268,7 @@ def _trim(a: Adoption) -> Found:
                 f"elevator {s.elevator:.2f}, aileron {s.aileron:.2f}, rudder {s.rudder:.2f}, "
                 f"throttle {s.throttle:.2f}; {left:.1e} m/s^2 or rad/s^2 is left"
             )
-        if left < best:
+        if not why or left < best:
             best, why = left, f"{speed:.0f} m/s: {reason}"
     tried = f"from {min(speeds):.0f} to {max(speeds):.0f} m/s" if len(speeds) > 1 else "there"
     raise RefusalError("trim", f"no level flight {tried}; nearest at {why}")
@@ -255,9 +289,10 @@ def _trimmed(tunnel: WindTunnel) -> tuple[float, str]:
     tunnel.solve(("bank", "aileron", "rudder"), (1, 3, 5), 8, 2e-3)
     left = tunnel.trim()
     if not left < STEADY:
-        if max(pushes) < 0.0:
-            return left, f"short by {-max(pushes) / GRAVITY:.2g} g at throttle {_THROTTLES[-1]:g}"
-        return left, f"an acceleration of {left:.2g} m/s^2 or rad/s^2 is left"
+        rest = tunnel.at()
+        if rest[0] < -STEADY and tunnel.setting.throttle > _MOST["throttle"]:
+            return left, f"short by {-rest[0] / GRAVITY:.2g} g at full throttle"
+        return left, f"{_AXES[int(np.abs(rest).argmax())].format(left)} is left"
     for name, most in _MOST.items():
         if abs(value := getattr(tunnel.setting, name)) > most:
             return left, f"{name} {value:.2f}, at most {most:g}"

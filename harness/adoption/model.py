@@ -1,6 +1,7 @@
 """A JSBSim model behind the fence, the properties that it names, and its copy with an inner loop."""
 
 import copy
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +15,10 @@ from harness.plants.model import data_root
 Element = ElementTree.Element
 
 _PROSE = {"fileheader", "description", "documentation", "author", "note", "notes", "reference", "license"}
+_COMPONENTS = {  # of a flight control system
+    "summer", "pure_gain", "scheduled_gain", "aerosurface_scale", "lag_filter", "lead_lag_filter", "washout_filter",
+    "second_order_filter", "integrator", "pid", "switch", "deadband", "fcs_function", "kinematic", "actuator", "sensor",
+}  # fmt: skip
 _NAME = re.compile(r"(?<![\w\]/])/?[a-zA-Z_][\w.-]*(?:\[\d+\])?(?:/[\w.-]+(?:\[\d+\])?)+")
 
 
@@ -77,3 +82,54 @@ def writers(root: Element) -> dict[str, str]:
         for component in root.iter()
         for output in component.findall("output")
     }
+
+
+def faults_of_engines(root: Element) -> Iterator[str]:
+    """Why engines may push less than their model's author meant."""
+    span = root.find("metrics/wingspan")
+    for engine in root.iterfind("propulsion/engine"):
+        propeller = engine.find("thruster//propeller")
+        if propeller is None:
+            continue
+        if engine.find("turbine_engine") is not None:
+            yield "a turbine drives a propeller: JSBSim takes its thrust in lb for a power in ft lb/s"
+        width = propeller.find("diameter")
+        if width is not None and span is not None and "unit" not in width.attrib and span.get("unit", "FT") == "FT":
+            told, wing = _number(width), _number(span)
+            if told > 0.5 * wing:
+                yield f'a propeller of <diameter> {told:g} without unit="IN" has {told:g} ft, on a wing of {wing:g} ft'
+
+
+def _number(element: Element) -> float:
+    try:
+        return float(element.text or "")
+    except ValueError:
+        return math.nan
+
+
+def integrator_after(root: Element, command: str) -> str | None:
+    """The first component between a command and what it moves that integrates: what it commands is then a rate."""
+    components = [each for each in root.iter() if each.tag in _COMPONENTS]
+    reached, more = {command.replace("[0]", "")}, True
+    while more:
+        more = False
+        for component in components:
+            reads = {name.replace("[0]", "") for name in _read(component)}
+            if reads & reached and not (made := _made(component)) <= reached:
+                if component.tag in ("integrator", "pid"):
+                    return f"<{component.tag} name={component.get('name', '')!r}>"
+                reached, more = reached | made, True
+    return None
+
+
+def _read(component: Element) -> Iterator[str]:
+    for element in component.iter():
+        if element.tag not in ("output", "description"):
+            yield from _NAME.findall(f"{element.text or ''} {element.get('value', '')}")
+
+
+def _made(component: Element) -> set[str]:
+    """The properties that a component writes: JSBSim makes one of its name, too."""
+    name = component.get("name", "").strip()
+    own = name if "/" in name else f"fcs/{name.lower().replace(' ', '-')}"
+    return {own, *((output.text or "").strip().replace("[0]", "") for output in component.findall("output"))}

@@ -27,6 +27,9 @@ _PLANTS = Path(__file__).parent
 _INNER_LOOP = Path(autopilot.__file__).parent
 _LOOP = "inner_loop"  # as a model names it
 _PROPERTY = re.compile(r"(?<![\w/])[a-z][\w-]*(?:/[\w-]+)+")
+_MOST_TANKS = 100
+_MOST_FUEL = 1e9  # lb: JSBSim takes what the tank holds
+_EMPTY = 1.0  # %
 _AB2 = 3  # JSBSim's number for the second-order Adams-Bashforth integrator
 
 Fdm = jsbsim.FGFDMExec
@@ -187,6 +190,17 @@ def cross(a: Vector, b: Vector) -> Vector:
 def unknown(fdm: Fdm, names: Iterable[str]) -> list[str]:
     """Those of these properties that do not exist."""
     return [name for name in names if not fdm.get_property_manager().hasNode(name)]
+
+
+def fill_empty_tanks(fdm: Fdm) -> bool:
+    """Fills all tanks of a model whose tanks are all empty; whether it did."""
+    tanks = [f"propulsion/tank[{i}]" for i in range(_MOST_TANKS)]
+    tanks = [tank for tank in tanks if not unknown(fdm, [f"{tank}/contents-lbs"])]
+    if not tanks or any(fdm[f"{tank}/pct-full"] > _EMPTY for tank in tanks):
+        return False
+    for tank in tanks:
+        fdm[f"{tank}/contents-lbs"] = _MOST_FUEL
+    return True
 
 
 def data_root() -> Path:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.plants.model import FT, Fdm, place
+from harness.plants.model import FT, Fdm, fill_empty_tanks, place, unknown
 from harness.plants.plant import Start
 
 Array = NDArray[np.float64]
@@ -83,6 +83,7 @@ class WindTunnel:
         self.fdm, self.controls, self.start, self.step, self.wind = fdm, controls, start, step, wind
         self.engines = int(fdm.get_propulsion().get_num_engines())
         self.setting = TrimPoint()
+        fill_empty_tanks(fdm)
         self._flying = [fdm[name] for name in _INTEGRATORS]
         for name in _INTEGRATORS:
             fdm[name] = 0
@@ -169,6 +170,11 @@ class WindTunnel:
         finally:
             self.setting = before
 
+    @property
+    def is_refuelled(self) -> bool:
+        """Whether it flies by a rocket: that burns fuel that flows, and its tanks are refilled for a constant mass."""
+        return not unknown(self.fdm, ["propulsion/engine/oxi-flow-rate-pps"])
+
     def start_engines(self) -> None:
         """Starts all engines, by the cockpit and by JSBSim's own short cut: either alone fails on some models."""
         fdm = self.fdm
@@ -189,6 +195,10 @@ class WindTunnel:
                 fdm[f"propulsion/engine[{i}]/set-running"] = 1
             self._crank()
             fdm["propulsion/fuel_freeze"] = 1
+        if self.is_refuelled:
+            fdm["propulsion/fuel_freeze"] = 0
+            fdm["propulsion/refuel"] = 1
+            self.run(1.0)
 
     def _crank(self) -> None:
         self.fdm["propulsion/starter_cmd"] = 1
