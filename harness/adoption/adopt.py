@@ -16,10 +16,9 @@ from harness.adoption.adoption import STANDARD, STEP, Adoption, Wish, motion, wr
 from harness.adoption.design import designed
 from harness.adoption.linear import COMMANDS, linearised
 from harness.adoption.manoeuvres import circled, law_of, turned
-from harness.adoption.model import Original, faults_of_engines, integrator_after, named, source, writers
+from harness.adoption.model import Element, Original, faults_of_engines, integrator_after, named, source, writers
 from harness.adoption.refusal import RefusalError
 from harness.child import MEMORY, ChildError, limited
-from harness.fence import Tag
 from harness.files import make_folder, write_text
 from harness.identification.identify import identify
 from harness.plants.model import FT, SLUG, Fdm, ModelError, check_body, fill_empty_tanks, load, parsed, unknown
@@ -190,7 +189,7 @@ def _engine(a: Adoption) -> Found:
     return replace(a, engine=told), told
 
 
-def _model(a: Adoption) -> Tag:
+def _model(a: Adoption) -> Element:
     return parsed(aircraft.model(a.folder))
 
 
