@@ -22,7 +22,7 @@ class Stream(NamedTuple):
 
 Streams = Mapping[str, Stream]
 UNITS = MappingProxyType({"bank": "rad", "bank_command": "rad", "pitch": "rad", "yaw": "rad", "altitude": "m",
-                          "lateral_acceleration": "m/s2"})  # fmt: skip
+                          "lateral_acceleration": "m/s2", "heading_rate_command": "rad/s"})  # fmt: skip
 VECTORS = MappingProxyType(
     {
         "velocity": (("velocity_north", "velocity_east", "velocity_down"), "ned"),

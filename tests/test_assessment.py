@@ -13,17 +13,25 @@ import pytest
 
 import aircraft
 import harness
-from benchmarks.blind_logs import SCALE, TURN, WIND, BlindLog, Gains, blind_log, compared, gains_of
+from autopilot.response import plain
+from benchmarks.blind_flights import BlindLog, blind_log
+from benchmarks.blind_logs import SCALE, TURN, WIND, Gains, compared, gains_of
 from harness.flight import Flight
 from harness.key import flight_key
+from harness.plants.identified import identified
+from harness.plants.lagged import Lagged
 from harness.plants.plant import Start
-from harness.recorded.assessment import CANNOT, LAG, LATERAL, Assessment, assess
+from harness.recorded.assessment import LATERAL, Assessment, assess
 from harness.recorded.beside import beside
 from harness.recorded.fitted_plant import document
-from harness.recorded.recorded_flight import Basis, LogError, LoggedEvent, RecordedFlight, sampled
+from harness.recorded.following import BANK, HEADING_RATE, Commanded
+from harness.recorded.panels import panels
+from harness.recorded.part_finding import CANNOT
+from harness.recorded.recorded_flight import Array, Basis, Channel, LogError, LoggedEvent, RecordedFlight, sampled
 from harness.recorded.said import as_json, beside_lines, lines
 from harness.verdict.parts import PARTS
 from harness.vocabulary import Verdict
+from harness.world.air import Air
 from tests.builders import invoke, write
 
 LEVEL, AIRSPEED, SIDESLIP = (
@@ -92,7 +100,7 @@ def test_an_airspeed_scale_moves_the_scale_and_no_turn_relation() -> None:
         (("airspeed",), AIRSPEED, "no measured airspeed"),
         (("bank",), RELATION, "the log has no bank"),
         (("velocity_north",), RELATION, "no velocity over the ground"),
-        (("bank_command",), LAG.title, "no bank command"),
+        (("bank_command",), BANK.lag.title, "no bank command"),
         (("lateral_acceleration",), LATERAL.title, "no lateral specific force"),
         (("altitude",), LEVEL, "no altitude"),
         ((), SIDESLIP, "no vane"),
@@ -204,10 +212,11 @@ def test_a_wind_that_changes_has_not_settled() -> None:
 
 
 def test_a_lag_of_telemetry_is_a_bound_and_one_on_board_an_interval() -> None:
-    flight = next(log(seed) for seed in range(20) if not log(seed).hidden.of_receipt and log(seed).hidden.lag > 0.1)
+    logs = map(log, range(20))
+    flight = next(each for each in logs if not each.hidden.of_receipt and each.hidden.lags[BANK.noun] > 0.1)
     on_board = flight.recorded()
-    assert assess(on_board)[LAG.title].word == Verdict.FAILS
-    bound = assess(replace(on_board, of_receipt=True))[LAG.title]
+    assert assess(on_board)[BANK.lag.title].word == Verdict.FAILS
+    bound = assess(replace(on_board, of_receipt=True))[BANK.lag.title]
     assert bound.word == Verdict.UNDECIDED
     assert bound.low == 0.0
     assert "age of the telemetry" in bound.reason
@@ -215,7 +224,75 @@ def test_a_lag_of_telemetry_is_a_bound_and_one_on_board_an_interval() -> None:
 
 def test_a_command_at_rest_does_not_tell_the_lag() -> None:
     flight = log(1).recorded().changed(np.zeros_like, "bank_command")
-    assert "not excited" in assess(flight)[LAG.title].reason
+    assert "not excited" in assess(flight)[BANK.lag.title].reason
+
+
+def turned(rate: float, gain: float, drift: float) -> RecordedFlight:
+    """A log of an aircraft that follows heading rates by a known response, with errors of both; and flies on board."""
+    of, period = np.random.default_rng(7), 0.05
+    plant = Lagged(RESPONSE).start(Start(heading=0.0, airspeed=15.0), Air())
+    commands = np.repeat(of.uniform(-0.25, 0.25, 90), 40)  # rad/s, for 2 s each
+    headings = [0.0]
+    for command in commands.tolist():
+        plant.advance(command, period)
+        headings.append(headings[-1] + math.remainder(plant.state.heading - headings[-1], math.tau))
+    time: Array = period * np.arange(len(headings), dtype=np.float64)
+    seen = np.arange(0.0, time[-1], 1.0 / rate)
+    yaw = gain * np.interp(seen, time, headings) + drift * seen + of.normal(0.0, math.radians(0.2), len(seen))
+    channels = {
+        "yaw": sampled(seen, yaw, Basis.ESTIMATED, ""),
+        "airspeed": sampled(seen, 15.0 + of.normal(0.0, 0.1, len(seen)), Basis.MEASURED, ""),
+        "heading_rate_command": Channel(time[:-1] + 0.5 * period, commands, Basis.COMMANDED, "", len(commands)),
+    }
+    return RecordedFlight(name="turned", sources=(), clock="", channels=channels)
+
+
+RESPONSE = plain(0.15, 5.0, 0.7)
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.8])
+@pytest.mark.parametrize("drift", [0.0, 0.02])
+def test_how_a_commanded_heading_rate_is_followed_is_recovered(gain: float, drift: float) -> None:
+    found = assess(turned(20.0, gain, drift))
+    followed, late = found[HEADING_RATE.gain.title], found[HEADING_RATE.lag.title]
+    assert followed.word == (Verdict.HOLDS if gain == 1.0 else Verdict.FAILS)
+    assert followed.low - 0.005 <= gain <= followed.high + 0.005
+    assert followed.high - followed.low < 0.05
+    assert late.word == Verdict.FAILS
+    assert late.low <= RESPONSE.lag <= late.high
+    assert late.high - late.low < 0.1
+    assert found[BANK.lag.title].reason == "the log has no bank"
+
+
+@pytest.mark.parametrize("of", [BANK, HEADING_RATE], ids=["bank", "heading rate"])
+def test_a_command_the_wrong_way_round_is_turned_and_said(of: Commanded) -> None:
+    flight = log(STILL).recorded()
+    right, found = assess(flight), assess(flight.changed(np.negative, of.command))
+    assert right[of.lag.title].word == Verdict.FAILS
+    assert [found[part.title] for part in (of.gain, of.lag)] == [right[part.title] for part in (of.gain, of.lag)]
+    said = f"{of.noun} command: the sign is the wrong way round beside the {of.flown}'s; turned"
+    assert said in found.notes
+    assert said not in right.notes
+
+
+def test_the_page_shows_the_commanded_heading_rate_beside_that_of_the_yaw() -> None:
+    found = assess(turned(20.0, 1.0, 0.0))
+    (panel,) = (panel for panel in panels(found.flight, found) if panel.title == "Heading rate")
+    assert panel.unit == "deg/s"
+    commanded, flown = panel.lines
+    assert np.abs(commanded.values).max() == pytest.approx(math.degrees(0.25), rel=0.05)
+    settled = np.interp(commanded.time[35::40], flown.time, flown.values)  # before the next command
+    assert settled == pytest.approx(commanded.values[35::40], abs=2.0)
+
+
+def test_an_aircraft_that_only_heading_rates_tell_flies_on_lagged_alone(tmp_path: Path) -> None:
+    file = write(tmp_path / "turned.toml", document(assess(turned(20.0, 1.0, 0.0))))
+    assert identified(file, 15.0).heading_rate.lag == pytest.approx(RESPONSE.lag, abs=0.03)
+    words = ("fly", "experiments/stationary.toml", "--set", f"aircraft={file}", "--set", "start.airspeed_mps=15")
+    assert invoke(*words, "--set", "plant=lagged").exit_code == 0
+    refused = invoke(*words, "--set", "plant=coordinated")
+    assert refused.exit_code == 2
+    assert "lagged does" in refused.output
 
 
 def test_a_log_too_short_to_judge_is_one_sentence_and_a_longer_one_a_table() -> None:
@@ -289,7 +366,7 @@ def test_the_flight_of_a_fitted_aircraft_is_known_by_the_files_content_and_flown
     ("change", "reason"),
     [
         (lambda flight: flight.changed(np.zeros_like, "bank_command"), "not excited"),
-        (lambda flight: without(flight, "bank_command"), "no bank command"),
+        (lambda flight: without(flight, "bank_command"), "neither a bank command"),
         (lambda flight: without(flight, "airspeed"), "no measured airspeed"),
         (lambda flight: every(flight, "bank", 8), "too few samples"),
     ],

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.blind_logs import BlindLog, blind_log
+from benchmarks.blind_flights import BlindLog, blind_log
 from harness.recorded.assessment import assess
 from harness.recorded.read import read_log
 from harness.recorded.recorded_flight import Array, RecordedFlight

@@ -154,6 +154,7 @@ def test_what_is_kept_beside_an_airframe_is_what_it_does(name: str, airspeed: fl
     turns = HELD_OUT["turns, changed every second"]
     wrong = error(kept.heading_rate, of_heading_rate(flown(airframe, airspeed, turns)))
     assert wrong == pytest.approx(kept.errors["turns, changed every second"][0], abs=5e-4)
+    assert kept.bank
     assert error(kept.bank, of_bank(flown(airframe, airspeed, turns, rate_trim=False), kept.bank_limit)) < 0.05
 
 

@@ -201,4 +201,5 @@ def test_the_plants_fly_by_the_file_beside_the_airframe() -> None:
     one = identified(aircraft.folder("aerosonde"), 25.2)
     flight = replace(FLIGHT, aircraft="aerosonde", start=Start(airspeed=25.2))
     assert plant_of(flight) == Lagged(one.heading_rate)
+    assert one.bank
     assert plant_of(replace(flight, plant="coordinated")) == Coordinated(one.bank, one.hold, one.bank_limit)

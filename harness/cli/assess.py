@@ -44,9 +44,9 @@ def assess(
     With --airframe the 6-DOF model of that airframe is flown with the recorded bank, at the recorded airspeed and in
     the recorded wind, and the same parts are told of it.
 
-    With --fit the response of the bank to its command is written to a file, which stands for an aircraft in settings
-    (aircraft = "FILE.toml"): fly and predict take it on the plants lagged and coordinated. A log that does not tell the
-    response is refused.
+    With --fit the response of bank or heading rate to its command is written to a file, which stands for an aircraft in
+    settings (aircraft = "FILE.toml"): fly and predict take it on the plant lagged, and on coordinated where the log has
+    a bank command. A log that does not tell the response is refused.
 
     \b
     Examples:
@@ -60,6 +60,7 @@ def assess(
     from harness.cli._input import BadInput, typed
     from harness.cli._paths import writable
     from harness.files import write_text
+    from harness.plants.identified import read
     from harness.recorded import contents, fitted_plant, said
     from harness.recorded.assessment import assess as assessed
     from harness.recorded.beside import beside
@@ -101,4 +102,5 @@ def assess(
         for line in ("", *said.beside_lines(found, model)):
             click.echo(line)
     if fit:
-        click.echo(f"\naircraft = {json.dumps(str(fit))}: for the plants lagged and coordinated")
+        plants = "plants lagged and coordinated" if read(fit)[0].bank else "plant lagged"
+        click.echo(f"\naircraft = {json.dumps(str(fit))}: for the {plants}")

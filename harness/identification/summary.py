@@ -54,7 +54,7 @@ def summary_lines(identification: Identification) -> Iterator[str]:
         [],
         [
             ["  heading rate from its command", _response(fitted.heading_rate)],
-            ["  bank from its command", _response(fitted.bank)],
+            ["  bank from its command", _response(fitted.bank) if fitted.bank else ""],
             [
                 "  airspeed from the load factor",
                 f"gain {hold.gain:.3g} m/s2, {hold.frequency:.3g} rad/s, damping {hold.damping:.3g}",

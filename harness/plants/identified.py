@@ -50,7 +50,7 @@ class Identified:
 
     airspeed: float
     heading_rate: Response  # from its command, with the rate trim
-    bank: Response  # from its command, without the rate trim
+    bank: Response | None  # from its command, without the rate trim; None where only heading rates were commanded
     hold: AirspeedHold
     bank_limit: float  # of the inner loop's command
     measured: Mapping[str, float]  # figures of the flown step and sweep, by name
@@ -63,6 +63,11 @@ class Identified:
 
     @property
     def coordinated(self) -> Coordinated:
+        """Raises `PlantError` where nothing is known of the bank."""
+        if self.bank is None:
+            raise PlantError(
+                "plant", "coordinated needs the response of the bank, and the log tells it not: lagged does"
+            )
         return Coordinated(self.bank, self.hold, self.bank_limit)
 
 
@@ -133,9 +138,10 @@ def document(airframe: Path, known: list[Identified]) -> str:
 def table_of(entry: Identified, source: str = "flown on sixdof") -> list[str]:
     """The lines of one identification in a file; `source` is where the measured numbers are from."""
     lines = ["[[at]]", f"airspeed = {entry.airspeed:g}", f"bank_limit = {entry.bank_limit:g}"]
+    bank = [("bank", asdict(entry.bank), "from its command, the rate trim off: coordinated")] if entry.bank else []
     for title, values, about in (
         ("heading_rate", asdict(entry.heading_rate), "from its command, the rate trim on: lagged"),
-        ("bank", asdict(entry.bank), "from its command, the rate trim off: coordinated"),
+        *bank,
         ("hold", asdict(entry.hold), "what the load factor beyond one does to the airspeed: coordinated"),
         ("measured", entry.measured, source),
     ):
@@ -157,7 +163,7 @@ def _from(table: Mapping[str, Any]) -> Identified:
     return Identified(
         airspeed=float(table["airspeed"]),
         heading_rate=Response(**_numbers(table["heading_rate"])),
-        bank=Response(**_numbers(table["bank"])),
+        bank=Response(**_numbers(table["bank"])) if "bank" in table else None,
         hold=AirspeedHold(**_numbers(table["hold"])),
         bank_limit=float(table["bank_limit"]),
         measured=MappingProxyType(_numbers(table["measured"])),

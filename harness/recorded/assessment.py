@@ -7,7 +7,7 @@ know of each other. A part that the log cannot answer is refused with its reason
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from harness.margins import Assess
 from harness.plants.turn import GRAVITY
 from harness.recorded import response_fit, turn
 from harness.recorded.cannot_judge import CannotJudgeError
+from harness.recorded.following import BANK, HEADING_RATE, Fitted, lag_of, response_of
+from harness.recorded.part_finding import CANNOT, PartFinding
 from harness.recorded.recorded_flight import Basis, Channel, RecordedFlight
 from harness.recorded.response_fit import ResponseFit
 from harness.recorded.turning import STOPPED, SteadyWind, Turning, TurnPoint, estimated_of, turning_of
@@ -27,38 +29,17 @@ from harness.vocabulary import Verdict
 
 Array = NDArray[np.float64]
 
-CANNOT = "cannot be judged from this log"
 FLYING = 6.0  # m/s, over the ground or through the air: an aircraft at that speed flies
 SHORTEST = 10.0  # s of flight
 WINDOW = 10.0  # s
 MOST_ALIKE = 0.4  # correlation of a window with the next: windows more alike than that are joined
 LEAST_LEAN = math.radians(2.0)  # rms of the bank about its mean, by which a lateral force is told from a zero offset
-LEAST_COMMAND = math.radians(1.0)  # rms of a command's change within a quarter of a second
-LEAST_EXPLAINED = 0.8  # of the bank, by its command
-SAMPLES_IN_LAG = 3.0  # values of the bank within the lag, or it cannot be told
 
 _CIRCULAR = "no vane: an angle made of an estimated wind is circular, since that takes sideslip for zero"
 
 LATERAL = Part(
     "lateral force", "lateral_force", "of g sin(bank)", "turn_ratio", "within", Group.COORDINATED, assumed=0.0
 )
-LAG = Part("bank follows at once", "bank_lag_s", "s late", "turn_ratio", "at most", Group.FOLLOWED, assumed=0.0)
-GAIN = replace(PARTS["heading_rate_gain_slow"], title="bank as commanded", column="bank_gain")
-
-
-@dataclass(frozen=True, slots=True)
-class PartFinding:
-    """What the log says of one part."""
-
-    part: Part
-    word: str  # of `Verdict`, or `CANNOT`
-    reason: str  # why it cannot be judged, or is undecided; else what goes with the number
-    value: float = math.nan  # in the part's unit, with its 95 % interval
-    low: float = math.nan
-    high: float = math.nan
-    windows: int = 0  # independent ones
-    needed: int | None = None  # windows that would decide, were they like these
-    bounds: Bounds = (None, None)  # of the value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +54,8 @@ class Assessment:
     estimated: Estimated | None  # the autopilot's wind
     points: tuple[TurnPoint, ...]
     age: float  # s, of the track beyond the bank's; NaN where it is not known
-    response: ResponseFit | None
+    bank: ResponseFit | None  # behind its command
+    heading_rate: ResponseFit | None
     notes: tuple[str, ...]  # conventions and scales that were found, a sentence each
 
     def __getitem__(self, title: str) -> PartFinding:
@@ -92,11 +74,12 @@ def assess(
         circular = "sideslip" in flight and flight["sideslip"].basis is not Basis.MEASURED
         reasons = [_CIRCULAR if part is _SIDESLIP and circular else str(refusal) for part in _PARTS]
         refused = tuple(PartFinding(part, CANNOT, reason) for part, reason in zip(_PARTS, reasons, strict=True))
-        return Assessment(flight, begin, end, refused, None, None, (), math.nan, None, ())
+        return Assessment(flight, begin, end, refused, None, None, (), math.nan, None, None, ())
     cut = flight.between(begin, end)
     notes: list[str] = []
     turning, cut = turning_of(cut, notes)
-    response, cut = _response(cut, notes)
+    bank, cut = response_of(cut, BANK, notes)
+    heading_rate, cut = response_of(cut, HEADING_RATE, notes)
     made: dict[str, _Made | CannotJudgeError] = {}
     makers: tuple[tuple[Part, Callable[[], _Made]], ...] = (
         (_LEVEL, lambda: _level(cut)),
@@ -104,21 +87,24 @@ def assess(
         (_SIDESLIP, lambda: _sideslip(cut)),
         (_TURN, lambda: _turn_relation(turning)),
         (LATERAL, lambda: _lateral(cut)),
-        (GAIN, lambda: _gain(response)),
+        (BANK.gain, lambda: _gain(bank)),
+        (HEADING_RATE.gain, lambda: _gain(heading_rate)),
     )
     for part, make in makers:
         try:
             made[part.column] = make()
         except CannotJudgeError as refusal:
             made[part.column] = refusal
-    findings = [*_worded(made, limits), _lag(cut, response)]
+    lags = [lag_of(fit, of, cut.of_receipt) for fit, of in ((bank, BANK), (heading_rate, HEADING_RATE))]
+    findings = [*_worded(made, limits), *lags]
     return Assessment(
         flight=cut, begin=begin, end=end, findings=tuple(findings),
         wind=turning.wind if isinstance(turning, Turning) else None,
         estimated=turning.estimated if isinstance(turning, Turning) else estimated_of(cut),
         points=turning.points if isinstance(turning, Turning) else (),
         age=turning.age if isinstance(turning, Turning) else math.nan,
-        response=response if isinstance(response, ResponseFit) else None, notes=tuple(notes),
+        bank=bank if isinstance(bank, ResponseFit) else None,
+        heading_rate=heading_rate if isinstance(heading_rate, ResponseFit) else None, notes=tuple(notes),
     )  # fmt: skip
 
 
@@ -255,60 +241,10 @@ def _lateral(flight: RecordedFlight) -> _Made:
     return _Made(Sample(np.array(pseudo), count, drawn=True), f"{_rms(turned):.2f} m/s2 rms")
 
 
-def _gain(response: "ResponseFit | CannotJudgeError") -> _Made:
-    if isinstance(response, CannotJudgeError):
-        raise response
-    return _Made(response.sample(response_fit.GAIN))
-
-
-def _response(flight: RecordedFlight, notes: list[str]) -> tuple["ResponseFit | CannotJudgeError", RecordedFlight]:
-    """The fitted response of the bank; the flight with its command the right way round."""
-    try:
-        found = _fitted(flight)
-        if found.gain < 0.0:
-            flight = flight.changed(np.negative, "bank_command")
-            notes.append("bank command: the sign is the wrong way round beside the bank's; turned")
-            found = _fitted(flight)
-    except CannotJudgeError as refusal:
-        return refusal, flight
-    return found, flight
-
-
-def _fitted(flight: RecordedFlight) -> ResponseFit:
-    if not flight.has("bank_command", "bank"):
-        raise CannotJudgeError("the log has no bank command" if "bank" in flight else "the log has no bank")
-    if float(np.std(flight["bank_command"].values)) < LEAST_COMMAND:
-        raise CannotJudgeError("not excited: the bank command hardly changes")
-    fit = response_fit.fitted(flight["bank_command"], flight["bank"])
-    if fit is None:
-        raise CannotJudgeError("too few samples: half a minute of bank and bank command is needed")
-    if fit.excited < LEAST_COMMAND:
-        changes = math.degrees(fit.excited)
-        raise CannotJudgeError(
-            f"not excited: the bank command changes by {changes:.2g} deg rms within a quarter of a second"
-        )
-    if abs(fit.explained) < LEAST_EXPLAINED:
-        raise CannotJudgeError(f"the command explains {100 * max(0.0, fit.explained):.0f} % of the bank's variation")
-    return fit
-
-
-def _lag(flight: RecordedFlight, response: "ResponseFit | CannotJudgeError") -> PartFinding:
-    """The lag: an upper bound where the telemetry's age is in it, or where samples are too few."""
-    if isinstance(response, CannotJudgeError):
-        return PartFinding(LAG, CANNOT, str(response))
-    low, high = response.lag_interval()
-    count = len(response.pseudo)
-    why = []
-    if flight.of_receipt:
-        why.append("the age of the telemetry is in it")
-    if response.interval * SAMPLES_IN_LAG > response.lag:
-        rate = 1.0 / response.interval
-        why.append(f"the bank has {rate:.2g} new values a second")
-    if why:
-        return PartFinding(LAG, Verdict.UNDECIDED, f"at most: {', and '.join(why)}", high, 0.0, high, count)
-    if low <= 0.0:
-        return PartFinding(LAG, Verdict.UNDECIDED, "the interval holds zero", response.lag, low, high, count)
-    return PartFinding(LAG, Verdict.FAILS, "", response.lag, low, high, count)
+def _gain(fit: Fitted) -> _Made:
+    if isinstance(fit, CannotJudgeError):
+        raise fit
+    return _Made(fit.sample(response_fit.GAIN))
 
 
 def _worded(made: "dict[str, _Made | CannotJudgeError]", limits: dict[str, float]) -> Iterator[PartFinding]:
@@ -386,5 +322,6 @@ def _rms(values: Array) -> float:
 
 _LEVEL, _AIRSPEED = PARTS["altitude_deviation_peak_m"], PARTS["airspeed_deviation"]
 _SIDESLIP, _TURN = PARTS["sideslip_rms_deg"], PARTS["turn_ratio"]
-_PARTS = (_LEVEL, _AIRSPEED, _SIDESLIP, _TURN, LATERAL, GAIN, LAG)
+_FOLLOWED = (BANK.gain, HEADING_RATE.gain, BANK.lag, HEADING_RATE.lag)
+_PARTS = (_LEVEL, _AIRSPEED, _SIDESLIP, _TURN, LATERAL, *_FOLLOWED)
 _BY_COLUMN = {part.column: part for part in _PARTS}

@@ -19,7 +19,16 @@ from harness.world.air import Air
 PERIOD = 0.05  # s, of a command
 _STEP = 0.005  # s, of the simulation
 _ALTITUDE = 150.0  # m
-_ASSUMED = ("bank", "airspeed", "velocity_north", "velocity_east", "altitude", "sideslip", "lateral_acceleration")
+_ASSUMED = (
+    "bank",
+    "yaw",
+    "airspeed",
+    "velocity_north",
+    "velocity_east",
+    "altitude",
+    "sideslip",
+    "lateral_acceleration",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +68,7 @@ def beside(found: Assessment, airframe: Path) -> ModelFlight:
             states.append(flying.state)
     except End as end:
         ended = f"{end.outcome}: {end}"
-    return ModelFlight(airframe.name, airspeed, assess(_recorded(airframe.name, np.array(states))), ended)
+    return ModelFlight(airframe.name, airspeed, assess(_recorded(airframe.name, np.array(states), commands)), ended)
 
 
 def _airspeed(found: Assessment) -> float:
@@ -80,7 +89,7 @@ def _heading(found: Assessment) -> float:
     return math.atan2(float(east.values[0]) - wind.east[0], float(north.values[0]) - wind.north[0])
 
 
-def _recorded(name: str, states: Array) -> RecordedFlight:
+def _recorded(name: str, states: Array, commands: Array) -> RecordedFlight:
     """The states as a log without noise. The bank command of a row is the one that led to it."""
     time: Array = PERIOD * np.arange(len(states), dtype=np.float64)
 
@@ -91,4 +100,6 @@ def _recorded(name: str, states: Array) -> RecordedFlight:
     channels["altitude_error"] = Channel(time, column("altitude") - _ALTITUDE, Basis.DERIVED, "", len(time))
     led = np.append(column("bank_command")[1:], column("bank_command")[-1])
     channels["bank_command"] = Channel(time, led, Basis.COMMANDED, "", len(time))
+    asked = np.append(commands, commands[-1])[: len(time)]
+    channels["heading_rate_command"] = Channel(time, asked, Basis.COMMANDED, "", len(time))
     return RecordedFlight(name=name, sources=(), clock="", channels=channels)

@@ -7,9 +7,11 @@ import numpy as np
 
 from harness.plants.coordinated import AirspeedHold
 from harness.plants.identified import Identified, table_of
-from harness.recorded.assessment import LAG, SAMPLES_IN_LAG, Assessment, averaged
+from harness.plants.turn import GRAVITY
+from harness.recorded.assessment import Assessment, averaged
+from harness.recorded.following import BANK, HEADING_RATE, SAMPLES_IN_LAG, Commanded
 from harness.recorded.recorded_flight import Array, Basis, LogError
-from harness.recorded.response_fit import GAIN
+from harness.recorded.response_fit import GAIN, ResponseFit
 
 SUREST = 0.4  # half of the lag's interval over the lag: a log that says less does not tell the response
 HELD = AirspeedHold(gain=0.0, frequency=1.0, damping=1.0)  # constant airspeed: its change is not fitted
@@ -22,27 +24,29 @@ BANK_LIMITS = {
 
 
 def identified(found: Assessment) -> Identified:
-    """What the plants fly by. Raises `LogError` with the reason where the log does not tell."""
-    fit = found.response
-    if fit is None:
-        raise LogError(f"no aircraft can be fitted to this log: {found[LAG.title].reason}")
-    if fit.interval * SAMPLES_IN_LAG > fit.lag:
-        raise LogError(
-            f"no aircraft can be fitted to this log: too few samples for the dynamics: the bank has "
-            f"{1.0 / fit.interval:.2g} new values a second, {SAMPLES_IN_LAG / fit.lag:.2g} are needed for a lag of "
-            f"{fit.lag:.2g} s"
-        )
-    low, high = fit.lag_interval()
-    if not (fit.lag > 0.0 and 0.5 * (high - low) <= SUREST * fit.lag):
-        raise LogError(
-            f"no aircraft can be fitted to this log: not excited enough: the lag is {fit.lag:.2g} s, anything from "
-            f"{low:.2g} to {high:.2g} s fits"
-        )
-    gain = fit.sample(GAIN).interval() or (math.nan, math.nan)
+    """What the plants fly by. Raises `LogError` with the reason where the log does not tell.
+
+    The heading rate follows as it does its own command, or as the bank does, whichever lag is surer.
+    """
+    fits: dict[Commanded, ResponseFit] = {}
+    refusals: list[str] = []
+    for of, fit in ((BANK, found.bank), (HEADING_RATE, found.heading_rate)):
+        if fit is None:
+            refused = found[of.lag.title].reason
+        elif not (refused := _unsure(fit, of)):
+            fits[of] = fit
+            continue
+        if of.command in found.flight:
+            refusals.append(refused)
+    if not fits:
+        reason = refusals[0] if refusals else "it has neither a bank command nor a heading rate command"
+        raise LogError(f"no aircraft can be fitted to this log: {reason}")
+    fit = min(fits.values(), key=_doubt)
+    (low, high), gain = fit.lag_interval(), fit.sample(GAIN).interval() or (math.nan, math.nan)
     return Identified(
         airspeed=float(f"{np.median(_airspeeds(found)):.3g}"),
         heading_rate=fit.response,
-        bank=fit.response,
+        bank=fits[BANK].response if BANK in fits else None,
         hold=HELD,
         bank_limit=_bank_limit(found),
         measured=MappingProxyType(
@@ -51,6 +55,25 @@ def identified(found: Assessment) -> Identified:
         ),
         errors=MappingProxyType({}),
     )  # fmt: skip
+
+
+def _unsure(fit: ResponseFit, of: Commanded) -> str:
+    """Why the fit does not tell the response; empty where it does."""
+    if fit.interval * SAMPLES_IN_LAG > fit.lag:
+        return (
+            f"too few samples for the dynamics: the {of.flown} has {1.0 / fit.interval:.2g} new values a second, "
+            f"{SAMPLES_IN_LAG / fit.lag:.2g} are needed for a lag of {fit.lag:.2g} s"
+        )
+    low, high = fit.lag_interval()
+    if not (fit.lag > 0.0 and _doubt(fit) <= SUREST):
+        return f"not excited enough: the lag is {fit.lag:.2g} s, anything from {low:.2g} to {high:.2g} s fits"
+    return ""
+
+
+def _doubt(fit: ResponseFit) -> float:
+    """Half of the lag's interval over the lag."""
+    low, high = fit.lag_interval()
+    return 0.5 * (high - low) / fit.lag
 
 
 def document(found: Assessment) -> str:
@@ -83,8 +106,12 @@ def _airspeeds(found: Assessment) -> Array:
 
 
 def _bank_limit(found: Assessment) -> float:
-    """The largest bank that the autopilot commands: by its parameters, else the largest that it commanded."""
+    """The largest bank that the autopilot commands: by its parameters, else the largest commanded, flown or asked."""
     for name, unit in BANK_LIMITS.items():
         if (value := found.flight.parameters.get(name, 0.0)) > 0.0:
             return value * unit
-    return float(np.abs(found.flight["bank_command"].values).max())
+    for name in ("bank_command", "bank"):
+        if name in found.flight:
+            return float(np.abs(found.flight[name].values).max())
+    fastest = float(np.abs(found.flight["heading_rate_command"].values).max())
+    return math.atan(fastest * float(np.median(_airspeeds(found))) / GRAVITY)

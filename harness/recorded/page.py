@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 
 from harness.drawing import COLOURS, FAINT, INK, draw
 from harness.recorded import panels as drawn
-from harness.recorded.assessment import CANNOT, Assessment
+from harness.recorded.assessment import Assessment
 from harness.recorded.beside import ModelFlight
 from harness.recorded.contents import HEADINGS, duration, rows
+from harness.recorded.part_finding import CANNOT
 from harness.recorded.recorded_flight import RecordedFlight
 from harness.recorded.said import HEADINGS as SAID_HEADINGS
 from harness.recorded.said import beside_rows, row, wind_line

@@ -6,11 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.recorded.assessment import CANNOT, Assessment, PartFinding
+from harness.recorded.assessment import Assessment
+from harness.recorded.part_finding import CANNOT, PartFinding
 from harness.recorded.recorded_flight import QUANTITIES, Array, RecordedFlight
 
 DEG = 180.0 / math.pi
 TURN = "turn relation"
+_SPAN = 0.4  # s
 COMMANDED, FLOWN, OTHER = "commanded", "flown", "other"  # which line of a panel
 
 
@@ -47,6 +49,7 @@ class Scatter(NamedTuple):
 _PANELS = (
     ("Airspeed", ("airspeed_command", "airspeed")),
     ("Bank", ("bank_command", "bank")),
+    ("Heading rate", ("heading_rate_command",)),
     ("Altitude", ("altitude_command", "altitude")),
     ("Altitude minus command", ("altitude_error",)),
     ("Lateral specific force", ("lateral_acceleration",)),
@@ -61,9 +64,10 @@ def panels(whole: RecordedFlight, found: Assessment) -> Iterator[FlightPanel]:
         lines = [_line(flight, name) for name in names if name in flight]
         if title == "Airspeed":
             lines += _of_the_track(flight, found)
+        if title == "Heading rate" and lines:
+            lines += _of_the_yaw(flight)
         if any(line.kind != COMMANDED for line in lines):
-            unit = QUANTITIES[names[-1]].unit
-            yield FlightPanel(title, "deg" if unit == "rad" else unit, lines)
+            yield FlightPanel(title, QUANTITIES[names[-1]].unit.replace("rad", "deg"), lines)
 
 
 def track(whole: RecordedFlight) -> tuple[Array, Array, Array] | None:
@@ -122,7 +126,7 @@ def _opposite(one: Array, other: Array) -> bool:
 
 def _line(flight: RecordedFlight, name: str) -> PanelLine:
     channel = flight[name]
-    scale = DEG if QUANTITIES[name].unit == "rad" else 1.0
+    scale = DEG if QUANTITIES[name].unit.startswith("rad") else 1.0
     if name.endswith("_command"):
         return PanelLine("commanded", COMMANDED, channel.time, scale * channel.values, held=True)
     return PanelLine(str(channel.basis), FLOWN, channel.time, scale * channel.values)
@@ -136,3 +140,12 @@ def _of_the_track(flight: RecordedFlight, found: Assessment) -> list[PanelLine]:
     north, east = flight.table(("velocity_north", "velocity_east"), time).T
     speed = np.hypot(north - found.wind.north[0], east - found.wind.east[0])
     return [PanelLine("ground velocity minus wind", OTHER, time, speed)]
+
+
+def _of_the_yaw(flight: RecordedFlight) -> list[PanelLine]:
+    """How fast the nose turns, over spans of `_SPAN`."""
+    if not flight.has("yaw"):
+        return []
+    time = np.arange(flight["yaw"].time[0], flight["yaw"].time[-1], _SPAN)
+    rate = DEG * np.diff(flight["yaw"].at(time)) / _SPAN
+    return [PanelLine("rate of the yaw", FLOWN, time[:-1] + 0.5 * _SPAN, rate)]

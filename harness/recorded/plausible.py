@@ -6,14 +6,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.recorded.recorded_flight import Array, Basis, Channel, LogError, RecordedFlight
+from harness.recorded.recorded_flight import QUANTITIES, Array, Basis, Channel, LogError, RecordedFlight
 
 # What an aircraft that flies reaches at most; of a few values a log may say anything.
 MOST: Mapping[str, float] = MappingProxyType(
     {
         "bank": np.pi, "pitch": np.pi / 2, "bank_command": np.pi, "pitch_command": np.pi / 2, "roll_rate": 15.0,
         "pitch_rate": 15.0, "yaw_rate": 15.0, "angle_of_attack": np.pi, "sideslip": np.pi, "aileron": 1.6,
-        "elevator": 1.6, "rudder": 1.6,
+        "elevator": 1.6, "rudder": 1.6, "heading_rate_command": 2.0,
     }
 )  # fmt: skip
 _FASTEST_TURN = 6.0  # rad/s, of a direction
@@ -41,7 +41,7 @@ def _too_large(flight: RecordedFlight) -> Iterator[str]:
         if name in MOST and len(channel) > 3:
             size = float(np.percentile(np.abs(channel.values), _SHARE))
             if size > 1.1 * MOST[name]:
-                yield f"{channel.source}: {name} reaches {size:.3g} rad: {_SAID}"
+                yield f"{channel.source}: {name} reaches {size:.3g} {QUANTITIES[name].unit}: {_SAID}"
         if name in ("yaw", "course") and len(channel) > 3:
             apart = np.maximum(np.diff(channel.time), _SHORTEST)
             pace = float(np.percentile(np.abs(np.diff(channel.values) / apart), _SHARE))

@@ -7,7 +7,8 @@ import numpy as np
 
 from harness.markup import markdown as as_markdown
 from harness.recorded import panels as drawn
-from harness.recorded.assessment import CANNOT, Assessment
+from harness.recorded.assessment import Assessment
+from harness.recorded.part_finding import CANNOT
 from harness.recorded.recorded_flight import Array, RecordedFlight
 from harness.recorded.said import HEADINGS, row, wind_line
 from harness.review.charts import Chart, ChartLine, axis

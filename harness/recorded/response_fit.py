@@ -1,7 +1,8 @@
-"""The response of the bank to its command, fitted to a recorded flight: a delay and a second order, with intervals.
+"""The response to a command, fitted to a recorded flight: a delay and a second order, with intervals.
 
-The gain and the zero of the bank are fitted beside them. Blocks of the flight are left out in turn, so that the
-intervals know how unlike each other the parts of the flight are.
+The gain and the zero are fitted beside them. Where a rate is commanded, what is flown is its integral, an angle; then
+each span of a few seconds counts from its own mean, since errors of a rate add up for ever. Blocks of the flight are
+left out in turn, so that the intervals know how unlike each other the parts of the flight are.
 """
 
 import math
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 BLOCKS = 20
 _GRID = 0.02  # s: the step of the response, unless that makes more than so many
 _MOST_STEPS = 500_000
+_SPAN = 4.0  # s: of an angle whose rate is commanded
 _TRANSIENT = 4.0  # s, at the beginning: what was commanded before the log is not known
 _LOWEST = (-0.5, math.log(1.0), math.log(0.3), 0.2, -0.5)
 _HIGHEST = (3.0, math.log(40.0), math.log(4.0), 3.0, 0.5)
@@ -44,12 +46,12 @@ class ResponseFit:
     explained: float  # share of the response's variation
     interval: float  # s, between two values of the response
     held: float  # s, half the time between two values of the command
-    excited: float  # rad rms: the change of the command within `interval` of the response's own time
+    excited: float  # rms, SI, rad: the change of the command within `interval` of the response's own time
     pseudo: Array  # (blocks, 5): delay, frequency, damping, gain, lag; the mean of each is an estimate without bias
 
     @property
     def lag(self) -> float:
-        """How late the bank is behind a slow command, s."""
+        """How late the response is behind a slow command, s."""
         return self.delay + 2.0 * self.damping / self.frequency
 
     @property
@@ -68,8 +70,11 @@ class ResponseFit:
         return Sample(values, len(values), drawn=True)
 
 
-def fitted(command: Channel, response: Channel) -> ResponseFit | None:
-    """The fit; None where command and response share less than half a minute."""
+def fitted(command: Channel, response: Channel, is_rate: bool = False) -> ResponseFit | None:
+    """The fit; None where command and response share less than half a minute.
+
+    With `is_rate` the command is the rate of the response, an angle.
+    """
     begin = max(command.time[0], response.time[0])
     end = min(command.time[-1], response.time[-1])
     inside = (response.time >= begin + _TRANSIENT) & (response.time <= end)
@@ -81,13 +86,20 @@ def fitted(command: Channel, response: Channel) -> ResponseFit | None:
     grid = np.arange(begin, end + step, step)
     u = command.at(np.minimum(grid + held, command.time[-1]))
     u = np.where(np.isfinite(u), u, 0.0)
+    spans = np.floor((time - time[0]) / _SPAN).astype(int)
+    slope = time - time[0] if is_rate else np.ones(len(time))  # of what a zero of the response adds
+    slope, y = (_centred(slope, spans), _centred(y, spans)) if is_rate else (slope, y)
     noise = _FIRM * float(np.std(np.diff(y))) / 10.0
 
     def off(x: Array) -> Array:
         delay, frequency, damping, gain, zero = x
-        follows = np.interp(time - delay, grid, _second_order(u, step, math.exp(frequency), math.exp(damping)))
+        over_time = _second_order(u, step, math.exp(frequency), math.exp(damping))
+        if is_rate:  # by the trapezium rule
+            over_time = step * (np.cumsum(over_time) - 0.5 * (over_time + over_time[0]))
+        follows = np.interp(time - delay, grid, over_time)
+        follows = _centred(follows, spans) if is_rate else follows
         usual = noise * (x[:3] - _USUAL) / _SPREAD
-        return np.concatenate([zero + gain * follows - y, usual])
+        return np.concatenate([zero * slope + gain * follows - y, usual])
 
     found = [
         least_squares(
@@ -106,6 +118,13 @@ def fitted(command: Channel, response: Channel) -> ResponseFit | None:
         explained=explained[first], interval=response.interval, held=held,
         excited=float(np.sqrt(np.mean(changes**2))), pseudo=_left_out(x, J, r, time),
     )  # fmt: skip
+
+
+def _centred(values: Array, spans: NDArray[np.intp]) -> Array:
+    """The values less the mean of their span."""
+    count = np.maximum(np.bincount(spans), 1)
+    centred: Array = values - (np.bincount(spans, weights=values) / count)[spans]
+    return centred
 
 
 def _left_out(x: Array, J: Array, r: Array, time: Array) -> Array:

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from harness.recorded.assessment import CANNOT, Assessment, PartFinding
+from harness.recorded.assessment import Assessment
 from harness.recorded.beside import ModelFlight
+from harness.recorded.part_finding import CANNOT, PartFinding
 from harness.tables import number, table
 from harness.vocabulary import Verdict
 

@@ -1,0 +1,106 @@
+"""Whether an aircraft follows what is commanded: its bank, or its heading rate, each with a gain and a lag."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from harness.recorded import response_fit
+from harness.recorded.cannot_judge import CannotJudgeError
+from harness.recorded.part_finding import CANNOT, PartFinding
+from harness.recorded.recorded_flight import RecordedFlight
+from harness.recorded.response_fit import ResponseFit
+from harness.verdict.parts import PARTS, Group, Part
+from harness.vocabulary import Verdict
+
+LEAST_EXPLAINED = 0.8  # of what is flown, by its command
+SAMPLES_IN_LAG = 3.0  # values of what is flown within the lag, or it cannot be told
+
+_GAIN = PARTS["heading_rate_gain_slow"]
+_LAG = Part("", "", "s late", "turn_ratio", "at most", Group.FOLLOWED, assumed=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Commanded:
+    """A quantity that is commanded, and the two parts that say how well it is followed."""
+
+    noun: str
+    command: str  # its channel
+    flown: str  # the channel of what follows
+    is_rate: bool  # what follows is an angle, and its rate is commanded
+    least: float  # rms of the command's change within a quarter of a second; SI, rad
+    gain: Part
+    lag: Part
+
+
+BANK = Commanded(
+    "bank", "bank_command", "bank", False, math.radians(1.0),
+    replace(_GAIN, title="bank as commanded", column="bank_gain"),
+    replace(_LAG, title="bank follows at once", column="bank_lag_s"),
+)  # fmt: skip
+HEADING_RATE = Commanded(
+    "heading rate", "heading_rate_command", "yaw", True, math.radians(0.5),
+    replace(_GAIN, title="heading rate as commanded", column="heading_rate_gain"),
+    replace(_LAG, title="heading rate follows at once", column="heading_rate_lag_s"),
+)  # fmt: skip
+
+Fitted = ResponseFit | CannotJudgeError
+
+
+class _UnexplainedError(CannotJudgeError):
+    """The command says next to nothing of what is flown."""
+
+
+def response_of(flight: RecordedFlight, followed: Commanded, notes: list[str]) -> tuple[Fitted, RecordedFlight]:
+    """The fitted response; the flight with its command the right way round."""
+    try:
+        return _fitted(flight, followed), flight
+    except _UnexplainedError as refusal:
+        turned = flight.changed(np.negative, followed.command)
+        try:
+            found = _fitted(turned, followed)
+        except CannotJudgeError:
+            return refusal, flight
+    except CannotJudgeError as refusal:
+        return refusal, flight
+    notes.append(f"{followed.noun} command: the sign is the wrong way round beside the {followed.flown}'s; turned")
+    return found, turned
+
+
+def _fitted(flight: RecordedFlight, followed: Commanded) -> ResponseFit:
+    noun, command, flown = followed.noun, followed.command, followed.flown
+    if not flight.has(command, flown):
+        raise CannotJudgeError(f"the log has no {f'{noun} command' if flown in flight else flown}")
+    if float(np.std(flight[command].values)) < followed.least:
+        raise CannotJudgeError(f"not excited: the {noun} command hardly changes")
+    fit = response_fit.fitted(flight[command], flight[flown], followed.is_rate)
+    if fit is None:
+        raise CannotJudgeError(f"too few samples: half a minute of {flown} and {noun} command is needed")
+    if fit.excited < followed.least:
+        changes, unit = math.degrees(fit.excited), "deg/s" if followed.is_rate else "deg"
+        raise CannotJudgeError(
+            f"not excited: the {noun} command changes by {changes:.2g} {unit} rms within a quarter of a second"
+        )
+    if fit.explained < LEAST_EXPLAINED:
+        share = 100 * max(0.0, fit.explained)
+        raise _UnexplainedError(f"the command explains {share:.0f} % of the {flown}'s variation")
+    return fit
+
+
+def lag_of(fit: Fitted, followed: Commanded, of_receipt: bool) -> PartFinding:
+    """The lag: an upper bound where the telemetry's age is in it, or where samples are too few."""
+    part = followed.lag
+    if isinstance(fit, CannotJudgeError):
+        return PartFinding(part, CANNOT, str(fit))
+    low, high = fit.lag_interval()
+    count = len(fit.pseudo)
+    why = []
+    if of_receipt:
+        why.append("the age of the telemetry is in it")
+    if fit.interval * SAMPLES_IN_LAG > fit.lag:
+        why.append(f"the {followed.flown} has {1.0 / fit.interval:.2g} new values a second")
+    if why:
+        return PartFinding(part, Verdict.UNDECIDED, f"at most: {', and '.join(why)}", high, 0.0, high, count)
+    if low <= 0.0:
+        return PartFinding(part, Verdict.UNDECIDED, "the interval holds zero", fit.lag, low, high, count)
+    return PartFinding(part, Verdict.FAILS, "", fit.lag, low, high, count)
