@@ -1,7 +1,7 @@
 """The model beside a recorded flight: the 6-DOF aircraft banks as was recorded, and the same parts are judged."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +98,7 @@ def _recorded(name: str, states: Array, commands: Array) -> RecordedFlight:
 
     channels = {field: Channel(time, column(field), Basis.MEASURED, "", len(time)) for field in _ASSUMED}
     channels["altitude_error"] = Channel(time, column("altitude") - _ALTITUDE, Basis.DERIVED, "", len(time))
+    channels["yaw"] = replace(channels["yaw"], values=np.unwrap(channels["yaw"].values))
     led = np.append(column("bank_command")[1:], column("bank_command")[-1])
     channels["bank_command"] = Channel(time, led, Basis.COMMANDED, "", len(time))
     asked = np.append(commands, commands[-1])[: len(time)]

@@ -106,6 +106,7 @@ def _over_time(figure: Figure, whole: RecordedFlight, found: Assessment, shown: 
             axes.plot(line.time, line.values, color=_COLOUR[line.kind], linewidth=0.9, drawstyle=style, label=line.name)
         if whole.failure:
             axes.axvline(whole.failure.time, color=COLOURS[1], linewidth=0.8, linestyle="--")
+        axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_ylabel(f"{panel.title}{f', {panel.unit}' if panel.unit else ''}", fontsize=7)
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.96), ncols=3, frameon=False, fontsize=6)
     every[-1].set_xlabel("time, s; shaded: judged" + ("; dashed: failure" if whole.failure else ""))
