@@ -154,7 +154,7 @@ def reductions(flights: pd.DataFrame) -> list[Reduced]:
     return found
 
 
-class Told(NamedTuple):
+class Saved(NamedTuple):
     """What is saved where, and what is not, in words."""
 
     summary: str
@@ -165,12 +165,12 @@ class Told(NamedTuple):
     advice: str  # what to fly so that something is saved; empty where something could be told
 
 
-def told(found: Sequence[Reduced], folder: str) -> Told:
+def told(found: Sequence[Reduced], folder: str) -> Saved:
     """Of flights of one highest plant in this folder; `found` is not empty."""
     plant = found[0].plant
     saving = [each for each in found if each.saves]
     why = Counter(each.why or f"saves less than a factor of {LEAST_SAVED:g}" for each in found if not each.saves)
-    return Told(
+    return Saved(
         f"Means and shares of {plant}, alone and with a cheaper plant as a control variate: in {len(saving)} of "
         f"{len(found)} (a metric in a cell) this saves a factor of {LEAST_SAVED:g} or more of {plant} flights.",
         headings(plant),

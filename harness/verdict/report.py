@@ -21,7 +21,7 @@ from harness.tables import number
 from harness.template import template
 from harness.verdict import answer, curve, figures, flown, grid, moved
 from harness.verdict.comparison import Comparison, Scorecard
-from harness.verdict.control_variates import ALIGNMENT, Told
+from harness.verdict.control_variates import ALIGNMENT, Saved
 from harness.verdict.effects import Disturbed, Ladder, disturbances, ladders
 from harness.verdict.pairs import shown, spread
 from harness.verdict.parts import PARTS, Group
@@ -72,7 +72,7 @@ def page(
     origin: Origin,
     logs: Mapping[str, FlightLog] = MappingProxyType({}),
     maps: Mapping[str, bytes] = MappingProxyType({}),
-    saved: Told | None = None,
+    saved: Saved | None = None,
 ) -> str:
     """The HTML page; `logs` by key: flights of `to_draw` that are at hand; `maps` by folder: pictures, SVG.
 
@@ -114,7 +114,7 @@ def page(
     )
 
 
-def markdown(comparison: Comparison, origin: Origin, saved: Told | None = None) -> str:
+def markdown(comparison: Comparison, origin: Origin, saved: Saved | None = None) -> str:
     """The answer and the matrix of parts and airframes in Markdown, with the commands that made them; see `page`."""
     return template("harness.verdict", "report.md.jinja").render(
         comparison=comparison,
