@@ -145,8 +145,19 @@ def test_channels_that_do_not_overlap_or_hold_next_to_nothing_are_refused_and_br
         return replace(flight, channels={**flight.channels, **later})
 
     damaged = [
-        *(moved(name) for name in ("airspeed", "wind_east", "velocity_east", "bank", "bank_command")),
-        *(every(flight, name, 10**5) for name in ("bank", "airspeed", "velocity_north", "bank_command")),
+        *(
+            moved(name)
+            for name in (
+                "airspeed",
+                "wind_east",
+                "velocity_east",
+                "bank",
+                "bank_command",
+                "heading_rate_command",
+                "yaw",
+            )
+        ),
+        *(every(flight, name, 10**5) for name in ("bank", "airspeed", "velocity_north", "bank_command", "yaw")),
         flight.changed(np.zeros_like, "airspeed"),
     ]
     for each in damaged:

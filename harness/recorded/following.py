@@ -34,15 +34,23 @@ class Commanded:
 
 
 BANK = Commanded(
-    "bank", "bank_command", "bank", False, math.radians(1.0),
-    replace(_GAIN, title="bank as commanded", column="bank_gain"),
-    replace(_LAG, title="bank follows at once", column="bank_lag_s"),
-)  # fmt: skip
+    noun="bank",
+    command="bank_command",
+    flown="bank",
+    is_rate=False,
+    least=math.radians(1.0),
+    gain=replace(_GAIN, title="bank as commanded", column="bank_gain"),
+    lag=replace(_LAG, title="bank follows at once", column="bank_lag_s"),
+)
 HEADING_RATE = Commanded(
-    "heading rate", "heading_rate_command", "yaw", True, math.radians(0.5),
-    replace(_GAIN, title="heading rate as commanded", column="heading_rate_gain"),
-    replace(_LAG, title="heading rate follows at once", column="heading_rate_lag_s"),
-)  # fmt: skip
+    noun="heading rate",
+    command="heading_rate_command",
+    flown="yaw",
+    is_rate=True,
+    least=math.radians(0.5),
+    gain=replace(_GAIN, title="heading rate as commanded", column="heading_rate_gain"),
+    lag=replace(_LAG, title="heading rate follows at once", column="heading_rate_lag_s"),
+)
 
 Fitted = ResponseFit | CannotJudgeError
 
