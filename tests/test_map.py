@@ -206,6 +206,25 @@ def test_every_plant_has_its_panel_and_the_predicted_limit_cycle_stands_where_th
     assert first.get_ylabel() == "law.k3, 1/s"
 
 
+def test_the_legend_names_a_predicted_border_where_one_is_drawn() -> None:
+    """With a slower actuator none is predicted, though the margins without one lie on both sides of the border."""
+    legends = []
+    for across in ("law.k3=0:10", "errors.actuator_lag_s=0:1"):
+        overrides = ["plant=sixdof", *(["law.k3=0.5"] if "lag" in across else [])]
+        space = Space(
+            read_settings(EXPERIMENTS / "gains.toml", overrides),
+            [dimension(across, "--x"), dimension("law.k2=0.5:20", "--y")],
+        )
+        found = map_of(space, question("chatters"), resolution=10)
+        (margins,) = (found.predicted(panel) for panel in found.panels)
+        assert margins is not None
+        assert np.nanmin(margins) < 1.0 < np.nanmax(margins)
+        legends.append([text.get_text() for legend in drawn(found).legends for text in legend.get_texts()])
+    flown, late = legends
+    assert "limit cycle, predicted" in flown
+    assert "limit cycle, predicted" not in late
+
+
 def test_settings_that_are_refused_are_unknown_and_not_flown(file: Path, tmp_path: Path) -> None:
     wind = ("--x", "wind.steady_mps.north=-10:10", "--y", "wind.steady_mps.east=-10:10")
     words = ("--of", "outcome", "--resolution", 10, "--workers", 0, "--set", "duration_s=1")

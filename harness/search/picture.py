@@ -141,8 +141,7 @@ def _panel(
     if len(flown):
         axes.plot(*flown.T, ".", color=INK, ms=1.8, mew=0.0, alpha=0.8)
     margins = found.predicted(panel)
-    if margins is not None and np.nanmin(margins) < 1.0 < np.nanmax(margins):
-        _cycle(axes, found, margins)
+    if margins is not None and _cycle(axes, found, margins):
         shown_lines.add("cycle")
     axes.set_xlim(found.x.low, found.x.high)
     axes.set_ylim(found.y.low, found.y.high)
@@ -156,12 +155,15 @@ def _at(found: Map, panel: MapPanel) -> dict[str, object]:
     return {**plant, **panel.at}
 
 
-def _cycle(axes: Axes, found: Map, margins: NDArray[np.float64]) -> None:
-    """The border of the predicted limit cycle, where the margin is one."""
+def _cycle(axes: Axes, found: Map, margins: NDArray[np.float64]) -> bool:
+    """The border of the predicted limit cycle, where the margin is one; whether there is any."""
+    if not np.nanmin(margins) < 1.0 < np.nanmax(margins):
+        return False
     shares = np.linspace(0.0, 1.0, len(margins))
     x, y = (np.array([_exact(d, share) for share in shares]) for d in (found.x, found.y))
-    axes.contour(x, y, np.log(np.clip(margins, 0.05, 20.0)), levels=[0.0], colors=BORDER, linewidths=1.8,
-                 linestyles="dashed")  # fmt: skip
+    drawn = axes.contour(x, y, np.log(np.clip(margins, 0.05, 20.0)), levels=[0.0], colors=BORDER, linewidths=1.8,
+                         linestyles="dashed")  # fmt: skip
+    return any(len(line) for line in drawn.allsegs[0])
 
 
 def _exact(dimension: Dimension, share: float) -> float:
