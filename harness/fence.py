@@ -22,7 +22,7 @@ SECTIONS = (  # of a model; not the others of JSBSim: output, input, child, plan
     "aerodynamics", "external_reactions", "buoyant_forces",
 )  # fmt: skip
 MOST_BYTES = 20_000_000  # of a file; the largest that travels with JSBSim has 0.12 million
-MOST_ELEMENTS = 300_000  # of a model with all that it includes; there 6000
+MOST_ELEMENTS = 60_000  # of a model with all that it includes; there 6000
 DEEPEST = 60  # elements in each other; there 13. JSBSim itself ends the process at some thousands
 LONGEST_DELAY = 60.0  # s, or thousands of frames, of a component: JSBSim keeps a number for each step
 _ENGINES = ("Engines", "engines", "Engine", "engine")  # folders, in the order in which JSBSim looks

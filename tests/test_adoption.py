@@ -11,6 +11,7 @@ import pytest
 import aircraft
 from harness.adoption import adopt as adopting
 from harness.adoption.adoption import Adoption, Wish
+from harness.adoption.adoption import write as write_files
 from harness.adoption.model import named, source
 from harness.adoption.refusal import RefusalError
 from harness.plants.identified import identified, is_stale
@@ -287,3 +288,26 @@ def test_a_mistake_in_a_map_of_controls_is_one_line(tmp_path: Path) -> None:
     said = invoke("adopt", "c172p", "--controls", controls)
     assert said.exit_code == 2
     assert "flaps is not one of elevator, aileron, rudder, throttle" in said.output
+
+
+def test_a_control_that_the_model_does_not_have_is_one_line_with_its_place_and_names_like_it(tmp_path: Path) -> None:
+    text = 'aileron = "fcs/aileron-cmd-norm"\nthrottle = [\n  "fcs/throttle-cmd-norm",\n  "fcs/throtle-cmd-norm[1]",\n]'
+    controls = write(tmp_path / "controls.toml", text)
+    said = invoke("adopt", "c172p", "--controls", controls, "--out", tmp_path / "out")
+    assert said.exit_code == 2
+    place = f"--controls: {controls}:4: throttle: the model has no property fcs/throtle-cmd-norm[1]; like it are "
+    assert f"{place}fcs/throttle-cmd-norm, " in said.output
+
+
+def test_a_model_too_slow_to_fly_is_refused_at_its_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = source("c172p")
+    folder = tmp_path / "c172p"
+    folder.mkdir()
+    adoption = Adoption(name="c172p", wish=Wish(), folder=folder, names=frozenset(named(model.root)), writers={})
+    write_files(adoption, model)
+    monkeypatch.setattr(adopting, "_SLOWEST", 0.0)
+    with pytest.raises(RefusalError, match=r"load: a step takes .* ms to compute, may take 0 ms"):
+        adopting.STAGES["load"](adoption)
+    monkeypatch.setattr(adopting, "LOADING", 0.01)
+    with pytest.raises(RefusalError, match=r"load: not done after 0\.01 s"):
+        found_up_to("load", "c172p", tmp_path / "out")

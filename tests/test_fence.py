@@ -97,7 +97,10 @@ HOSTILE: dict[str, tuple[Callable[[str], str], str]] = {
         "xml:1: a DOCTYPE is not read",
     ),
     "deep": (section("<system>" * 20_000 + "</system>" * 20_000), "elements stand more than 60 deep"),
-    "many": (section("<system>" + "<a/>" * fence.MOST_ELEMENTS + "</system>"), "more than 300000 elements"),
+    "many": (
+        section("<system>" + "<a/>" * fence.MOST_ELEMENTS + "</system>"),
+        "more than 60000 elements",
+    ),
     "another model": (section('<child name="other"/>'), "<child> is another model, which is not read"),
     "above": (section('<system file="../other/secret"/>'), "a model includes files in its own folder only"),
     "absolute": (section('<system file="/etc/passwd"/>'), "a model includes files in its own folder only"),

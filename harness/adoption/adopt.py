@@ -6,7 +6,9 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +19,22 @@ from harness.adoption.design import designed
 from harness.adoption.linear import COMMANDS, linearised
 from harness.adoption.manoeuvres import circled, law_of, turned
 from harness.adoption.model import Element, Original, faults_of_engines, integrator_after, named, source, writers
-from harness.adoption.refusal import RefusalError
+from harness.adoption.refusal import NoSuchPropertyError, RefusalError
 from harness.child import MEMORY, ChildError, limited
 from harness.files import make_folder, write_text
 from harness.identification.identify import identify
-from harness.plants.model import FT, SLUG, Fdm, ModelError, check_body, fill_empty_tanks, load, parsed, unknown
+from harness.plants.model import (
+    FT,
+    SLUG,
+    Fdm,
+    ModelError,
+    check_body,
+    fill_empty_tanks,
+    load,
+    parsed,
+    property_names,
+    unknown,
+)
 from harness.plants.plant import End, PlantError
 from harness.plants.turn import GRAVITY
 from harness.plants.wind_tunnel import POUND, STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
@@ -29,6 +42,9 @@ from harness.plants.wind_tunnel import POUND, STEADY, Controls, NotFiniteError, 
 SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0, 2.8)  # times that of the lift coefficient below
 LIFT_COEFFICIENT = 0.5
 SECONDS = 60.0  # that all stages together may take
+LOADING = 20.0  # s, that its load may take
+_SLOWEST = 2e-4  # s of computing for a step: all stages together need some 150 000
+_STEPS_TIMED = 50
 _THROTTLES = (0.15, 0.4, 0.65, 0.9)
 _MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # of a command in trim
 
@@ -69,9 +85,11 @@ def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterato
             stage, work = stages[0], {**STAGES, "identify": _identify}[stages[0]]
             write(adoption, model)
             try:
-                adoption, line = limited(stage, max(1.0, end - time.monotonic()), MEMORY, work, adoption)
+                left = max(1.0, end - time.monotonic())
+                adoption, line = limited(stage, min(left, LOADING) if stage == "load" else left, MEMORY, work, adoption)
             except ChildError as error:
                 late = f"not done after {seconds:g} s, which a model has for all stages"
+                late = f"not done after {LOADING:g} s" if stage == "load" and left > LOADING else late
                 refusal = RefusalError(stage, late if error.is_late else error.cause)
             except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
                 refusal = RefusalError(stage, " ".join(str(error).replace(f"{temporary}/", "").split()))
@@ -118,6 +136,9 @@ def _load(a: Adoption) -> Found:
     invented = tuple(sorted(unknown(fdm, a.names)))
     for missing in invented:
         fdm[missing] = 0.0
+    for name in _names(a.wish.controls or {}):
+        if unknown(fdm, [name]):
+            raise NoSuchPropertyError(name, tuple(get_close_matches(name, {*property_names(fdm), *a.names})))
     told = tuple(sorted(_told(a, fdm).items()))
     engines = int(fdm.get_propulsion().get_num_engines())
     throttles = tuple(f"fcs/throttle-cmd-norm[{i}]" for i in range(max(1, engines)))
@@ -127,6 +148,9 @@ def _load(a: Adoption) -> Found:
     fdm.run_ic()
     check_body(fdm)
     mass, area = SLUG * fdm["inertia/mass-slugs"], FT**2 * fdm["metrics/Sw-sqft"]
+    step = _seconds_of_a_step(WindTunnel(fdm, controls, a.start, STEP))
+    if step > _SLOWEST:
+        raise RefusalError("load", f"a step takes {1e3 * step:.2g} ms to compute, may take {1e3 * _SLOWEST:g} ms")
     if not area > 0.0:
         raise RefusalError("load", f"the wing has an area of {area:g} m^2")
     a = replace(
@@ -137,12 +161,23 @@ def _load(a: Adoption) -> Found:
     return a, f"{made}{filled}, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
 
 
+def _seconds_of_a_step(tunnel: WindTunnel) -> float:
+    began = time.process_time()
+    tunnel.run(_STEPS_TIMED * STEP)
+    return (time.process_time() - began) / _STEPS_TIMED
+
+
 def _told(a: Adoption, fdm: Fdm) -> dict[str, str]:
     """Of each property of FlightGear that the model names and does not write, the one of JSBSim that it follows."""
     names = {name.replace("[0]", "") for name in a.names} - set(a.writers)
     sources = {name: source for name in names if (source := cockpit.source_of(name))}
     missing = unknown(fdm, [source.lstrip("-") for source in sources.values()])
     return {name: source for name, source in sources.items() if source.lstrip("-") not in missing}
+
+
+def _names(controls: Mapping[str, Any]) -> Iterator[str]:
+    for value in controls.values():
+        yield from [value] if isinstance(value, str) else value
 
 
 def _table(controls: Controls) -> dict[str, object]:

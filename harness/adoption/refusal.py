@@ -11,3 +11,15 @@ class RefusalError(ValueError):
 
     def __reduce__(self) -> tuple[type["RefusalError"], tuple[str, str]]:  # a process may send it to another
         return RefusalError, (self.stage, self.message)
+
+
+class NoSuchPropertyError(RefusalError):
+    """The user names a control that the model does not have; `near` are names of its properties that are like it."""
+
+    def __init__(self, name: str, near: tuple[str, ...]) -> None:
+        like = f"; like it are {', '.join(near)}" if near else ""
+        super().__init__("load", f"the model has no property {name}{like}")
+        self.name, self.near = name, near
+
+    def __reduce__(self) -> tuple[type["NoSuchPropertyError"], tuple[str, tuple[str, ...]]]:  # type: ignore[override]
+        return NoSuchPropertyError, (self.name, self.near)

@@ -48,7 +48,7 @@ def adopt(
     """
     from harness.adoption.adopt import adopt as stages
     from harness.adoption.adoption import Wish
-    from harness.adoption.refusal import RefusalError
+    from harness.adoption.refusal import NoSuchPropertyError, RefusalError
     from harness.cli._input import BadInput
     from harness.cli._paths import writable_folder
 
@@ -57,7 +57,7 @@ def adopt(
     ):  # fmt: skip
         if value is not None and not math.isfinite(value):
             raise BadInput(f"{option}: {value}, must be a finite number")
-    names = _controls(controls) if controls else None
+    names, places = _controls(controls) if controls else (None, {})
     writable_folder(out)
     wish = Wish(
         airspeed=airspeed,
@@ -69,6 +69,8 @@ def adopt(
     try:
         for stage, found in stages(model, out, wish):
             click.echo(f"{stage:<10} {found}")
+    except NoSuchPropertyError as error:
+        raise BadInput(f"{places[error.name]}: {error.message}") from None
     except RefusalError as error:
         if error.stage == "guard":
             raise BadInput(str(error)) from None
@@ -78,28 +80,33 @@ def adopt(
     click.echo(f'adopted: aircraft = "{out / name}"; try harness fly {out / name / "circle.toml"}')
 
 
-def _controls(file: Path) -> dict[str, object]:
-    """The names of properties in the file. Raises `BadInput`."""
+def _controls(file: Path) -> tuple[dict[str, object], dict[str, str]]:
+    """The names of properties in the file, and where each stands. Raises `BadInput`."""
     import tomllib
 
     from harness.cli._input import BadInput
     from harness.fence import fault_of_command
     from harness.files import read
+    from harness.settings.toml_locator import key_lines, nearest_line
 
     allowed = ("elevator", "aileron", "rudder", "throttle")
     try:
-        table = tomllib.loads(read(file).decode())
+        content = read(file).decode()
+        table = tomllib.loads(content)
     except OSError as error:
         raise BadInput(f"--controls: {file}: {error.strerror}") from None
     except ValueError as error:
         raise BadInput(f"--controls: {file}: {error}") from None
+    lines, places = key_lines(content), {}
     for name, value in table.items():
+        at = f"--controls: {file}:{nearest_line(lines, (name,))}: {name}"
         if name not in allowed:
-            raise BadInput(f"--controls: {file}: {name} is not one of {', '.join(allowed)}")
+            raise BadInput(f"{at} is not one of {', '.join(allowed)}")
         texts = value if isinstance(value, list) and name == "throttle" else [value]
         if not texts or not all(isinstance(text, str) and text.strip() for text in texts):
-            raise BadInput(f"--controls: {file}: {name} must be the name of a property")
-        for text in texts:
+            raise BadInput(f"{at} must be the name of a property")
+        for i, text in enumerate(texts):
+            places[text] = f"--controls: {file}:{nearest_line(lines, (name, i))}: {name}"
             if fault := fault_of_command(text):
-                raise BadInput(f"--controls: {file}: {name}: {fault}")
-    return table
+                raise BadInput(f"{places[text]}: {fault}")
+    return table, places

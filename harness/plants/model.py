@@ -192,6 +192,11 @@ def unknown(fdm: Fdm, names: Iterable[str]) -> list[str]:
     return [name for name in names if not fdm.get_property_manager().hasNode(name)]
 
 
+def property_names(fdm: Fdm) -> list[str]:
+    """The names of all properties that JSBSim has of its own or for the model, but for those of FlightGear."""
+    return [line.partition(" ")[0] for line in fdm.query_property_catalog("").splitlines() if line]
+
+
 def fill_empty_tanks(fdm: Fdm) -> bool:
     """Fills all tanks of a model whose tanks are all empty; whether it did."""
     tanks = [f"propulsion/tank[{i}]" for i in range(_MOST_TANKS)]
