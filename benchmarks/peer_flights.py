@@ -5,14 +5,18 @@ no autopilot. The process writes its version once it has flown, or what it lacks
 flies again and writes the processor time.
 """
 
+import atexit
 import json
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -105,6 +109,20 @@ def own_disturbed(seconds: float) -> Fly:
     from harness.world.wind import Wind
 
     return own_log(own_flight(seconds, wind=Wind(turbulence="moderate"), estimator=Estimator(kind="ekf")))
+
+
+def own_c172p(seconds: float) -> Fly:
+    """The harness on the c172p, adopted: the aircraft, the steps and the commands of those built on JSBSim."""
+    from harness.adoption.adopt import adopt
+    from harness.adoption.adoption import Wish
+    from harness.settings import load_flight
+
+    folder = TemporaryDirectory(prefix="harness-")
+    atexit.register(folder.cleanup)
+    for _ in adopt("c172p", Path(folder.name), Wish()):
+        pass
+    flight = load_flight(Path(folder.name) / "c172p" / "circle.toml")
+    return own_log(replace(flight, step=1 / 60, guidance_period=GUIDANCE, duration=seconds))
 
 
 def own_log(flight: Any) -> Fly:
@@ -267,6 +285,7 @@ class Simulator(NamedTuple):
     requires: tuple[str, ...] = ()  # what pip installs; nothing: it is here
 
 
+ADOPTED = "this harness, c172p"
 _OWN, _C172P = "JSBSim alone, ultra_stick_25e", "JSBSim alone, c172p"
 _REWARDS = (
     "it computes 11 state variables, a reward and whether the episode has ended, whose end is not heeded, and keeps "
@@ -311,6 +330,16 @@ SIMULATORS: Mapping[str, Simulator] = MappingProxyType(
             command_ms="50",
             reference=_C172P,
             does="`fdm.run()`, and two commands each 50 ms that hold wings and pitch; no autopilot, nothing logged",
+        ),
+        ADOPTED: Simulator(
+            "standoff-harness",
+            own_c172p,
+            flies="c172p",
+            step_ms="16.7",
+            command_ms="50",
+            reference=_C172P,
+            does="the same as on its own aircraft; `harness adopt` has given the model an inner loop, which is not in "
+            "the bare loop beside it",
         ),
         "jsbgym": Simulator(
             "jsbgym",

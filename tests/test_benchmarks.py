@@ -105,9 +105,11 @@ def test_the_page_of_other_searches_tells_the_median_and_how_many_found_it() -> 
 
 def test_the_page_of_other_simulators_times_those_that_are_here_and_names_the_others(tmp_path: Path) -> None:
     page = tmp_path / "other_simulators.md"
-    peers.main(rounds=1, seconds=5, path=page)
+    names = [name for name in peer_flights.SIMULATORS if name != peer_flights.ADOPTED]  # which takes a minute
+    peers.main(rounds=1, seconds=5, names=names, path=page)
     table, missing = page.read_text(encoding="utf-8").split("## Not measured")
-    for name, of in peer_flights.SIMULATORS.items():
+    for name in names:
+        of = peer_flights.SIMULATORS[name]
         rows = [line for line in table.splitlines() if line.startswith(f"| {name} |")]
         if not of.requires:
             assert len(rows) == 1, name
