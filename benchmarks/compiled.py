@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from autopilot.laws import law
-from benchmarks.measured import keep
+from benchmarks.measured import busy, keep
 from benchmarks.runs import used
 from harness import loop
 from harness.compiled import engine
@@ -95,7 +95,10 @@ def sped_up(flight: Flight, pairs: int, of: Callable[[Callable[[Flight], FlightL
 
 def block(pairs: int, flights: int) -> Iterator[str]:
     """What was measured, in Markdown."""
-    yield f"`nftsm`, 100 s, 20 Hz, {os.cpu_count()} processors; times as fast, medians of {pairs} pairs and range:"
+    yield (
+        f"`nftsm`, 100 s, 20 Hz, {os.cpu_count()} processors, {busy()}; times as fast, medians of {pairs} pairs and "
+        "range:"
+    )
     yield ""
     rows = {"alone": ["a flight", "45 to 80"], "metrics": ["a flight with its metrics", "20"]}
     times = ["a compiled flight, ms", ""]

@@ -1,9 +1,15 @@
 """A block of a page that a benchmark writes: between `<!-- measured by NAME -->` and `<!-- /measured -->`."""
 
+import os
 import re
 from pathlib import Path
 
 from harness.files import write_text
+
+
+def busy() -> str:
+    """How much the machine does beside the benchmark: to be asked before it begins."""
+    return f"load {os.getloadavg()[0]:.1f} by other processes"
 
 
 def keep(page: Path, name: str, block: str) -> None:

@@ -8,7 +8,7 @@ import os
 import platform
 import statistics
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,10 +22,13 @@ import aircraft
 from autopilot.estimator import Estimator
 from autopilot.laws import law
 from benchmarks.flight_speed import bare_loop, seconds, spread
+from benchmarks.in_vain import least, section
+from benchmarks.measured import busy
+from harness import loop
 from harness.adoption.adopt import adopt
 from harness.adoption.adoption import Wish
 from harness.files import write_text
-from harness.flight import Flight, air_of
+from harness.flight import Flight, air_of, context_of
 from harness.log import COLUMNS
 from harness.loop import simulate
 from harness.plants.model import Fdm
@@ -121,8 +124,10 @@ def page_of_adopted(found: Sequence[Adopted]) -> Iterator[str]:
     yield from markdown(("model", "times with, 1.3 asked at most", "times without", "s"), rows, "lr")
 
 
-def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], starts: list[float]) -> Iterator[str]:
-    """The page, in Markdown."""
+def page(
+    flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], starts: list[float], load: str
+) -> Iterator[str]:
+    """The page, in Markdown; `load` is what the machine did beside them."""
     (plain, _), *_ = flights.values()
     still, turbulent, filtered, _, quick = found.values()
     steps = round(plain.duration / plain.step)
@@ -133,7 +138,7 @@ def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], 
     yield "\n`make bench` measures it; `python -m benchmarks.performance` writes this page (a few minutes).\n"
     yield (
         f"Machine: {os.cpu_count()} processors, {platform.machine()}, Python {platform.python_version()}, "
-        f"NumPy {np.__version__}, JSBSim {jsbsim.__version__}."
+        f"NumPy {np.__version__}, JSBSim {jsbsim.__version__}; {load}."
     )
     yield (
         f"A flight of `{AIRFRAME}` with `nftsm` for {plain.duration:g} s, in steps of {plain.step:g} s, that logs "
@@ -161,11 +166,30 @@ def page(flights: Mapping[str, tuple[Flight, str]], found: Mapping[str, Timed], 
     yield from markdown(("part", "µs"), [(name, f"{1e6 * value:.2f}") for name, value in parts], "lr")
 
 
+def alone(flight: Flight) -> Iterator[str]:
+    """The parts of a guidance period, each again and again, in Markdown."""
+    flying = SixDof(aircraft.folder(flight.aircraft), flight.step, rate_trim=True).start(flight.start, air_of(flight))
+    target, wind = flight.target.start()(0.0), flight.wind.steady
+    law = loop.begun(flight.law, context_of(flight))
+    seen = loop.observe(flying.state, flight.start.airspeed, wind, target)
+    row, answer = bytearray(loop._ROW_BYTES), law(seen)
+    parts: dict[str, Callable[[], object]] = {
+        "reading the state from JSBSim": partial(flying._read, 0.0),
+        "observation": partial(loop.observe, flying.state, flight.start.airspeed, wind, target),
+        "law": partial(law, seen),
+        "record": lambda: loop._write_row(row, 0, 0.0, *flying.state, *target, *answer),
+    }
+    times = {name: least(work, 4000) for name, work in parts.items()}
+    yield "\nThe parts of a guidance period, each again and again, so that the processor's cache holds what it needs:\n"
+    yield from markdown(("part", "µs"), [(name, f"{time:.2f}") for name, time in times.items()], "lr")
+    yield "\nIn a flight they take longer, since they run between two stretches of JSBSim, which needs the cache, too."
+
+
 def main(
     pairs: int = 5, duration: float = 900.0, *, path: Path = PAGE, models: Sequence[str] = ("c172p", "T38", "dr1")
 ) -> None:
     """Measures, and writes the page."""
-    flights = cases(duration)
+    flights, load = cases(duration), busy()
     found = {}
     for name, (flight, _) in flights.items():
         found[name] = timed(flight, pairs)
@@ -173,7 +197,12 @@ def main(
     (plain, _), *_ = flights.values()
     plant = SixDof(aircraft.folder(AIRFRAME), plain.step, rate_trim=True)
     starts = [seconds(partial(plant.start, plain.start, air_of(plain))) for _ in range(20)][1:]
-    lines = [*page(flights, found, starts), *page_of_adopted([adopted(name, pairs, duration) for name in models])]
+    lines = [
+        *page(flights, found, starts, load),
+        *alone(plain),
+        *section(plain, pairs),
+        *page_of_adopted([adopted(name, pairs, duration) for name in models]),
+    ]
     write_text(path, "\n".join(lines) + "\n")
     print(path)
 

@@ -139,6 +139,8 @@ def test_the_page_of_what_a_flight_costs_has_every_case_and_part(
         assert ratio > 0.8
     (step,) = re.findall(r"JSBSim, a step of 5 ms \| ([\d.]+) \|", text)
     assert float(step) > 0.0
+    assert "with SciPy's inverse, which moves no bit" in text
+    assert re.search(r"a command takes [\d.]+ µs, in Python [\d.]+\.", text)
     assert len(lines(capsys)) == len(performance.cases(20.0)) + 1
 
 
