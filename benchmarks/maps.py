@@ -19,7 +19,9 @@ from scipy.ndimage import distance_transform_cdt
 import harness
 from harness.files import write_text
 from harness.log.metric import measure
+from harness.runs.engine import engine_for
 from harness.runs.run import Options
+from harness.runs.survey import survey
 from harness.search.border import Answer, BorderSearch
 from harness.search.dimension import dimension
 from harness.search.map import Map, map_of, question
@@ -159,7 +161,9 @@ def _flown(file: Path, over: list[str], of: str, overrides: list[str], workers: 
     folder = Path("out/maps") / file.stem / str(time.time_ns())
     folder.mkdir(parents=True)
     begin = time.monotonic()
-    for _ in found.fly(folder, Options(workers=workers)):
+    (*_, middle) = survey(space.tried[1])
+    engine = engine_for(middle, None, found.flights / middle.flights)  # as the command does
+    for _ in found.fly(folder, Options(workers=workers, compiled=engine.compiled)):
         pass
     seconds = time.monotonic() - begin
     drawn(found).savefig(folder / "map.png", dpi=200)
