@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SITE := $(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/site
 
-.PHONY: demo test install docs models identify paper lock turbulence airspeed promise notebook verdict laws bench tuned_gains planted blind peers fuzz adopt-all adopted clean
+.PHONY: demo test install docs models identify paper lock turbulence airspeed variance promise notebook verdict laws bench tuned_gains planted blind peers fuzz adopt-all adopted clean
 
 demo: install  ## fly the main job: the paper's case, two laws, three aircraft
 	$(BIN)/harness demo --out out/demo
@@ -46,6 +46,11 @@ turbulence: install  ## fly the airframes in turbulence: docs/answers/turbulence
 airspeed: install  ## which airspeed a law should compute with: docs/answers/airspeed.md (two minutes)
 	$(BIN)/harness run experiments/airspeed.toml --out out/airspeed --log none
 	$(BIN)/python -m harness.studies.airspeed out/airspeed
+
+variance: install  ## what cheaper plants save of 6-DOF flights: docs/answers/variance_reduction.md (ten minutes on two processors)
+	$(BIN)/harness run experiments/monte_carlo.toml --out out/variance --log none --set 'plant=["kinematic","lagged","coordinated"]' --set 'seed={start=0,count=320}'
+	$(BIN)/harness run experiments/monte_carlo.toml --out out/variance --log none --set plant=sixdof --set 'seed={start=0,count=100}'
+	$(BIN)/python -m harness.studies.variance_reduction out/variance
 
 promise: install  ## fly the laws that know the inner loop: docs/answers/promise.md (two minutes)
 	$(BIN)/python -m harness.studies.promise

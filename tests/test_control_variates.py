@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from harness.studies.statistics import SCATTERS
+from harness.studies.variance_reduction import StudyError, found, page
 from harness.verdict.control_variates import LEAST_SAVED, Controlled, Reduced, mean_with, reductions, share_with
 from harness.verdict.pairs import CompareError, entered
 from tests.builders import fly_matrix, invoke, result, results, write
@@ -71,12 +72,12 @@ def test_the_interval_of_a_share_holds_the_truth_also_where_every_flight_agrees(
     assert np.mean(holds) >= 0.95
 
 
-def flights(further: int = 60, agree: float = 0.98) -> pd.DataFrame:
-    """Twenty seeds on both plants and further ones on the kinematic one; one metric goes together on them."""
+def flights(further: int = 60, agree: float = 0.98, common: int = 20) -> pd.DataFrame:
+    """Some seeds on both plants and further ones on the kinematic one; one metric goes together on them."""
     draws = np.random.default_rng(8)
-    errors = draws.normal(2.0, 0.5, 20 + further)
+    errors = draws.normal(2.0, 0.5, common + further)
     rows = [result("kinematic", seed, settings={"law.k2": 3.0}) | {METRIC: x} for seed, x in enumerate(errors.tolist())]
-    own = agree * errors[:20] + math.sqrt(1.0 - agree**2) * draws.normal(size=20)
+    own = agree * errors[:common] + math.sqrt(1.0 - agree**2) * draws.normal(size=common)
     rows += [result("sixdof", seed, settings={"law.k2": 3.0}) | {METRIC: x} for seed, x in enumerate(own.tolist())]
     return results(rows)
 
@@ -156,3 +157,16 @@ seed = { start = 0, count = 12 }
         _, _, section = (tmp_path / name).read_text().partition("A cheaper plant as a control variate")
         assert summary in section
         assert all(re.search(rf"[>|] ?{re.escape(factor)} ?[<|]", section) for factor in saving)
+
+
+def test_the_study_tells_by_groups_of_seeds_what_is_saved_and_whether_the_intervals_hold() -> None:
+    of = found(flights(common=60))
+    assert (of.plant, of.seeds, of.groups, of.further) == ("sixdof", 60, 3, 60)
+    (saving,) = [each for each in of.savings if each.metric == METRIC]
+    assert saving.factor > LEAST_SAVED
+    assert all(each.reduced.low <= saving.truth <= each.reduced.high for each in saving.of)
+    (paired,) = [each for each in of.paired if each.metric == METRIC]
+    assert paired.factors[0] > LEAST_SAVED
+    assert f"| `{METRIC}` |" in page(of, "make variance")
+    with pytest.raises(StudyError, match="sixdof has 20 seeds"):
+        found(flights())
