@@ -99,6 +99,7 @@ class _Server:
     """The process that forks, as this one sees it."""
 
     def __init__(self) -> None:
+        use_one_thread()  # before spawn: the server has imported the libraries when it serves
         self._calls, calls = SPAWN.Pipe()
         self._process = SPAWN.Process(target=_serve, args=(calls,), daemon=True)
         self._process.start()
@@ -139,7 +140,6 @@ def _idle() -> _Server:
 def _serve(calls: Connection) -> None:
     """Answers one call after the other until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    use_one_thread()  # a fork has only one
     while True:
         try:
             call = _Call(*calls.recv())

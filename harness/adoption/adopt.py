@@ -80,33 +80,25 @@ def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterato
             names=frozenset(named(model.root)),
             writers=writers(model.root),
         )
-        stages, grounded = [*STAGES, "identify"], None
+        stages, first = list(STAGES), None
         while stages:
-            stage, work = stages[0], {**STAGES, "identify": _identify}[stages[0]]
+            stage = stages.pop(0)
             write(adoption, model)
             try:
-                left = max(1.0, end - time.monotonic())
-                adoption, line = limited(stage, min(left, LOADING) if stage == "load" else left, MEMORY, work, adoption)
-            except ChildError as error:
-                late = f"not done after {seconds:g} s, which a model has for all stages"
-                late = f"not done after {LOADING:g} s" if stage == "load" and left > LOADING else late
-                refusal = RefusalError(stage, late if error.is_late else error.cause)
-            except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
-                refusal = RefusalError(stage, " ".join(str(error).replace(f"{temporary}/", "").split()))
-            except RefusalError as error:
-                refusal = error
-            else:
-                yield from ((stage, part) for part in line.splitlines())
-                del stages[0]
-                continue
-            if stage == "identify":
-                yield stage, f"without lagged and coordinated: {refusal.message}"
-                break
-            grounded = grounded or refusal
-            if stage not in _IN_TRIM or not adoption.speeds or time.monotonic() > end:
-                raise grounded from None
-            yield stage, f"{refusal.message}: at another airspeed"
-            stages = ["trim", *_IN_TRIM, "identify"]
+                adoption, line = _done(stage, adoption, end, seconds)
+            except RefusalError as refusal:
+                first = first or refusal
+                if stage not in _IN_TRIM or not adoption.speeds or time.monotonic() > end:
+                    raise first from None
+                stages = ["trim", *_IN_TRIM]
+                line = f"{refusal.message}: at another airspeed"
+            yield from ((stage, part) for part in line.splitlines())
+        write(adoption, model)
+        try:
+            adoption, line = _done("identify", adoption, end, seconds)
+        except RefusalError as refusal:
+            line = f"without lagged and coordinated: {refusal.message}"
+        yield from (("identify", part) for part in line.splitlines())
         write(adoption, model)
         make_folder(kept)
         for pattern in _FILES:
@@ -115,6 +107,21 @@ def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterato
             else:
                 (kept / file.name).unlink(missing_ok=True)  # of an earlier adoption
         aircraft.keep_written(kept)
+
+
+def _done(stage: str, adoption: Adoption, end: float, seconds: float) -> Found:
+    """What a stage finds in a process of its own, until `end`. Raises `RefusalError` for all that goes wrong there."""
+    left = max(1.0, end - time.monotonic())
+    if is_short := stage == "load" and left > LOADING:
+        left = LOADING
+    try:
+        return limited(stage, left, MEMORY, {**STAGES, "identify": _identify}[stage], adoption)
+    except ChildError as error:
+        allowed = f"{LOADING:g} s" if is_short else f"{seconds:g} s, which a model has for all stages"
+        raise RefusalError(stage, f"not done after {allowed}" if error.is_late else error.cause) from None
+    except (ModelError, PlantError, NotFiniteError, RuntimeError) as error:
+        what = str(error).replace(f"{adoption.folder.parent}/", "")
+        raise RefusalError(stage, " ".join(what.split())) from None
 
 
 def _check_place(kept: Path, model: Original) -> None:
