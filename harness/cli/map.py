@@ -68,7 +68,8 @@ def map_(
 
     Asked is whether the flight has a convergence time (converged), its outcome, a metric, or whether it does NAME OP
     VALUE, as in 'range_error_peak_m < 5'. Of a number the border is where it jumps by a tenth of its reach. What lies
-    between the points of the coarse lattice, narrower than 1/25 of a range, may be missed: see the guide.
+    between the points of the coarse lattice, with the default resolution narrower than 1/18 of a range, may be missed:
+    see the guide.
 
     Prints how much of each panel has which answer and how many flights it took. Writes OUT/map.png and OUT/map.svg,
     which `harness report` shows, OUT/points.csv and OUT/border.csv. The result does not depend on the number of
