@@ -27,6 +27,7 @@ from benchmarks.measured import busy
 from harness import loop
 from harness.adoption.adopt import adopt
 from harness.adoption.adoption import Wish
+from harness.compiled import engine
 from harness.files import write_text
 from harness.flight import Flight, air_of, context_of
 from harness.log import COLUMNS
@@ -46,10 +47,10 @@ class Timed(NamedTuple):
 
     flown: list[float]
     bare: list[float]
+    compiled: list[float]  # by compiled steps
 
-    @property
-    def ratios(self) -> list[float]:
-        return [f / b for f, b in zip(self.flown, self.bare, strict=True)]
+    def ratios(self, flown: Sequence[float]) -> list[float]:
+        return [f / b for f, b in zip(flown, self.bare, strict=True)]
 
     def over(self, other: "Timed | None" = None) -> float:
         """How much longer the flight takes than bare JSBSim, or by how much more than another flight does, s."""
@@ -72,10 +73,12 @@ def cases(duration: float) -> dict[str, tuple[Flight, str]]:
 
 def timed(flight: Flight, pairs: int) -> Timed:
     """The flight and the bare loop, in turn."""
-    found = Timed([], [])
+    found = Timed([], [], [])
+    assert not engine.why_plain(flight)
     for _ in range(pairs):
         found.bare.append(bare_loop(flight))
         found.flown.append(seconds(partial(simulate, flight)))
+        found.compiled.append(seconds(partial(engine.simulate, flight)))
     return found
 
 
@@ -147,15 +150,17 @@ def page(
     yield "Beside it a bare loop that does nothing but `fdm.run()`, as often, on the same trimmed model in still air."
     yield f"Processor time, in turn; medians and ranges of {len(still.flown)} pairs.\n"
     rows = [
-        (name, asked, spread(each.ratios), spread(each.flown))
+        (name, asked, spread(each.ratios(each.compiled)), spread(each.ratios(each.flown)), spread(each.flown))
         for (name, (_, asked)), each in zip(flights.items(), found.values(), strict=True)
     ]
-    yield from markdown(("flight", "asked at most", "times the bare loop", "s"), rows, "lr")
+    yield from markdown(("flight", "asked at most", "times the bare loop, compiled", "in Python", "s"), rows, "lr")
+    yield "\n*Compiled*: with [compiled steps](guide/many_flights.md#compiled-flights), as many flights are flown; one"
+    yield "flight is flown in Python."
     yield f"\nBuilding, loading and trimming takes {spread(starts, 1e3)} ms; 2.5 ms are asked."
     yield "[Compiled flights](guide/many_flights.md#compiled-flights) are those of the other plants;"
     yield "[other simulators](answers/other_simulators.md) fly beside this one on a page of their own.\n"
     yield "## Where the time goes\n"
-    yield "From differences of the medians above:\n"
+    yield "From differences of the medians above, in Python:\n"
     parts = (
         (f"JSBSim, a step of {1e3 * plain.step:g} ms", statistics.median(still.bare) / steps),
         ("observation, law, command and record, a guidance period", still.over() / periods),
@@ -174,7 +179,7 @@ def alone(flight: Flight) -> Iterator[str]:
     seen = loop.observe(flying.state, flight.start.airspeed, wind, target)
     row, answer = bytearray(loop._ROW_BYTES), law(seen)
     parts: dict[str, Callable[[], object]] = {
-        "reading the state from JSBSim": partial(flying._read, 0.0),
+        "reading the state from JSBSim": partial(flying.read, 0.0),
         "observation": partial(loop.observe, flying.state, flight.start.airspeed, wind, target),
         "law": partial(law, seen),
         "record": lambda: loop._write_row(row, 0, 0.0, *flying.state, *target, *answer),
@@ -193,7 +198,7 @@ def main(
     found = {}
     for name, (flight, _) in flights.items():
         found[name] = timed(flight, pairs)
-        print(f"{name}: {spread(found[name].ratios)} times the bare loop", flush=True)
+        print(f"{name}: {spread(found[name].ratios(found[name].compiled))} times the bare loop, compiled", flush=True)
     (plain, _), *_ = flights.values()
     plant = SixDof(aircraft.folder(AIRFRAME), plain.step, rate_trim=True)
     starts = [seconds(partial(plant.start, plain.start, air_of(plain))) for _ in range(20)][1:]

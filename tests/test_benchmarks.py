@@ -135,8 +135,8 @@ def test_the_page_of_what_a_flight_costs_has_every_case_and_part(
     performance.main(pairs=1, duration=20, path=tmp_path / "performance.md", models=["c172p"])
     text = (tmp_path / "performance.md").read_text(encoding="utf-8")
     for case in performance.cases(20.0):
-        (ratio, _) = medians(next(line for line in text.splitlines() if line.startswith(f"| {case} |")))
-        assert ratio > 0.8
+        compiled_, python, _ = medians(next(line for line in text.splitlines() if line.startswith(f"| {case} |")))
+        assert min(compiled_, python) > 0.8
     (step,) = re.findall(r"JSBSim, a step of 5 ms \| ([\d.]+) \|", text)
     assert float(step) > 0.0
     assert "with SciPy's inverse, which moves no bit" in text

@@ -85,6 +85,33 @@ def test_500_random_flights_have_the_same_digests_and_tables_compiled_as_in_pyth
     assert outcomes >= {Outcome.COMPLETED, Outcome.TARGET_LOST}
 
 
+def test_flights_on_sixdof_by_compiled_steps_have_the_tables_of_python_however_they_end() -> None:
+    outcomes, stalled = set(), 0
+    for seed in range(0, 120, 5):  # with one law
+        flight, draw = anywhere(seed), random.Random(seed)
+        gust = Gust(from_=1.0, to=4.0, velocity=(0.0, 10.0, draw.choice([0.0, 12.0, 25.0])))  # some stall
+        flight = replace(
+            flight, plant="sixdof", aircraft="ultra_stick_25e", errors=replace(flight.errors, command_delay=0.0),
+            wind=replace(flight.wind, gusts=(gust,), turbulence=draw.choice(["none", "moderate"])),
+            start=replace(flight.start, airspeed=13.0, altitude=draw.choice([40.0, 120.0])),
+            estimator=replace(flight.estimator, kind=draw.choice(["truth", "ekf"])),
+        )  # fmt: skip
+        plain, quick = loop.simulate(flight), compiled(flight)
+        assert (quick.digest, quick.reason) == (plain.digest, plain.reason), flight
+        assert np.array_equal(quick.table, plain.table, equal_nan=True), flight
+        outcomes.add(plain.outcome)
+        stalled += plain.outcome is Outcome.COMPLETED and bool((plain["angle_of_attack"] > 0.5).any())
+    assert outcomes >= {Outcome.COMPLETED, Outcome.DEPARTED, Outcome.GROUND, Outcome.TARGET_LOST}
+    assert stalled
+
+
+def test_a_flight_by_compiled_steps_is_watched_row_by_row() -> None:
+    flight = replace(FLIGHT, plant="sixdof", duration=1.0)
+    rows: list[tuple[float, int]] = []
+    engine._trusted(flight, lambda time, so_far: rows.append((time, len(so_far()))))
+    assert rows == [(k * flight.guidance_period, k + 1) for k in range(flight.periods + 1)]
+
+
 TWO = ("atan2", "copysign", "remainder", "fmod", "hypot", "power")
 ONE = ("sin", "cos", "tan", "asin", "atan", "exp", "log1p", "sqrt", "radians")
 
@@ -177,7 +204,7 @@ def test_both_engines_make_the_same_rows_with_a_law_of_ones_own_whatever_it_rais
 @pytest.mark.parametrize(
     ("settings", "why"),
     [
-        (["plant=sixdof"], "on sixdof: the plant sixdof has no closed form"),
+        (["plant=sixdof", "errors.command_delay_s=0.1"], "on sixdof: errors.command_delay_s delays the command"),
         (["law.name=lq_orbit", "law.gains=slow"], "the law lq_orbit on kinematic: it holds "),
     ],
 )

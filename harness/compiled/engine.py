@@ -1,7 +1,9 @@
 """The compiled engine: flies a flight by a kernel, bit for bit as `harness.loop` does, where that can be."""
 
 import math
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -11,17 +13,31 @@ from numpy.typing import NDArray
 from autopilot.response import Delay, Piece
 from harness import loop
 from harness.compiled.kernel import Kernel, NotCompiledError, is_installed, kernel, refuse
-from harness.compiled.loop import COMPLETED, TARGET_LOST, UNUSUAL, at_once, flown, in_pieces, moving
+from harness.compiled.loop import (
+    COMPLETED,
+    NOT_FLYING,
+    TARGET_LOST,
+    UNUSUAL,
+    Look,
+    at_once,
+    flown,
+    in_pieces,
+    looking,
+    moving,
+)
 from harness.flight import Flight, air_of, command_delay, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, perfect_estimator
 from harness.log import COLUMNS, FlightLog
-from harness.plants.level import InPieces, Level, MovingInPieces
+from harness.plants.ladder import PLANTS
+from harness.plants.level import InPieces, Level, MovingInPieces, States
 from harness.plants.plant import End, Outcome
+from harness.plants.state import State
 from harness.toml_text import shortened
 from harness.world.air import Air
 from harness.world.target import Leg, Target, TargetState
 
 Array = NDArray[np.float64]
+_TRIED = 100.0  # s of the first flight of a kernel, which Python flies as well
 _AT_ONCE = 20_000  # rows between two calls of `watch`
 _TRUSTED: set[Any] = set()  # kernels that flew a flight as Python did
 
@@ -35,9 +51,9 @@ def simulate(flight: Flight, watch: loop.Watch | None = None) -> FlightLog:
 
 
 def why_plain(flight: Flight) -> str:
-    """Why Python flies this flight; empty where a kernel does. It is compiled and tried, once in a process."""
+    """Why Python flies this flight; empty where a kernel does. It is compiled and its beginning is tried."""
     try:
-        _trusted(flight, None)
+        _trusted(_beginning(flight), None)
     except NotCompiledError as error:
         return str(error)
     except ValueError:  # it cannot be flown at all: that is told where it is flown
@@ -46,93 +62,178 @@ def why_plain(flight: Flight) -> str:
 
 
 def _trusted(flight: Flight, watch: loop.Watch | None) -> FlightLog:
-    """The log as a kernel makes it; the first flight of each kernel in a process is flown by Python as well.
+    """The log as a kernel makes it; Python flies the beginning of each kernel's first flight in a process as well.
 
     Raises `NotCompiledError`, and what `harness.loop.simulate` raises.
     """
     if not is_installed():
         raise NotCompiledError("there is no Numba: pip install 'standoff-harness[fast]'")
     ready = _ready(flight)
-    compiled, numbers = kernel(ready.function)
-    log = _flown(flight, watch, ready, compiled, numbers)
+    compiled, held = kernel(ready.function)
+    log = _flown(flight, watch, ready, compiled, held)
     if compiled not in _TRUSTED:
-        plain = loop.simulate(flight)
-        if plain.outcome is not log.outcome or not np.array_equal(plain.whole, log.whole, equal_nan=True):
+        if not _begins(log, loop.simulate(_beginning(flight))):
             refuse(ready.function, "compiled, it does not fly to the last bit as in Python")
             raise NotCompiledError("compiled, it does not fly to the last bit as in Python")
         _TRUSTED.add(compiled)
     return log
 
 
+def _beginning(flight: Flight) -> Flight:
+    """The beginning of the flight, `_TRIED` seconds at most."""
+    periods = max(1, math.floor(_TRIED / flight.guidance_period))
+    return flight if periods >= flight.periods else replace(flight, duration=periods * flight.guidance_period)
+
+
+def _begins(log: FlightLog, plain: FlightLog) -> bool:
+    """Whether a log begins with the bits of another, which ends as it does or at an earlier time."""
+    as_it_does = plain.outcome is log.outcome or (plain.outcome is Outcome.COMPLETED and len(plain) < len(log))
+    return as_it_does and np.array_equal(plain.whole, log.whole[: len(plain)], equal_nan=True)
+
+
+class _Rows(NamedTuple):
+    """What a kernel reads and fills, row by row."""
+
+    table: Array
+    target: Array
+    seen: Array  # the target as the law knows it
+    noise: Array  # of the course, or none
+    told: Array  # the law's own channels
+
+
+_Progress = Iterator[tuple[int, int]]  # how the flight has ended, and the number of rows that are filled
+
+
 class _Ready(NamedTuple):
     """A flight before its first row."""
 
-    function: Callable[..., Any]  # its loop
-    air: Air
-    now: tuple[float, ...]
-    states: tuple[float, ...]
-    late: tuple[Array, int, Array]  # commands, and how late they are: see `flown`
-    line: tuple[Any, ...]  # of `in_pieces`
+    function: Callable[..., Any]  # what is compiled
+    fly: Callable[[Callable[..., Any], Any, _Rows, bool], _Progress]
+    """By the compiled function and the numbers that it holds, into rows; last, whether somebody watches."""
 
 
 def _ready(flight: Flight) -> _Ready:
-    """Raises `NotCompiledError` for a flight that has no closed form, or whose law cannot start."""
+    """Raises `NotCompiledError` for a flight that cannot be compiled, or whose law cannot start."""
+    if PLANTS[flight.plant].has_body and flight.errors.command_delay:
+        raise NotCompiledError("errors.command_delay_s delays the command")
     air = air_of(flight)
     flying = plant_of(flight).start(flight.start, air)
-    if not isinstance(flying, Level):
-        raise NotCompiledError(f"the plant {flight.plant} has no closed form")
     try:
-        law = loop.begun(flight.law, context_of(flight))
+        look = looking(loop.begun(flight.law, context_of(flight)))
     except End as end:
         raise NotCompiledError(str(end)) from None
-    whole, part = command_delay(flight)
+    if isinstance(flying, Level):
+        return _in_closed_form(flight, look, air, flying)
+    return _by_steps(flight, look, flying)
+
+
+def _in_closed_form(flight: Flight, look: Look, air: Air, flying: Level) -> _Ready:
+    """The whole loop is compiled."""
+    last, (whole, part) = flight.periods, command_delay(flight)
     parts = (part, flight.guidance_period - part) if part else (flight.guidance_period,)
-    late = np.empty(flight.periods), whole, np.array(parts)
-    if not isinstance(flying.move, MovingInPieces):
-        return _Ready(flown(law, at_once(flying.move)), air, tuple(flying.moved), (), late, ())
-    motion = flying.move.motion
-    step = in_pieces(motion.commanded, motion.piece, motion.ended)
-    line = np.empty(flight.periods * len(parts)), *_line(motion, parts, flight.periods)
-    return _Ready(flown(law, step), air, tuple(flying.moved), motion.states, late, line)
+    late = np.empty(last), whole, np.array(parts)
+    step = at_once(flying.move)
+    states: States = ()
+    line: tuple[Any, ...] = ()
+    if isinstance(flying.move, MovingInPieces):
+        motion = flying.move.motion
+        step, states = in_pieces(motion.commanded, motion.piece, motion.ended), motion.states
+        line = np.empty(last * len(parts)), *_line(motion, parts, last)
+
+    def fly(compiled: Callable[..., Any], held: Any, rows: _Rows, watched: bool) -> _Progress:
+        velocity, drift = air.sampled(late[-1], last)
+        done, state, ended = 0, (tuple(flying.moved), states), COMPLETED
+        while done <= last and ended == COMPLETED:
+            end = min(last + 1, done + _AT_ONCE if done else 1) if watched else last + 1
+            before = velocity, drift, late, line, (done, end, last), flight.start.altitude
+            ended, done, *state = compiled(*rows, *before, _known(flight), *state, held)
+            yield ended, done
+
+    return _Ready(flown(look, step), fly)
+
+
+def _by_steps(flight: Flight, look: Look, flying: Any) -> _Ready:
+    """JSBSim flies the periods, and what is done between two of them is compiled."""
+    from harness.compiled.stepwise import reading  # late: only this plant needs JSBSim
+    from harness.plants.sixdof import SixDofFlying
+
+    if not isinstance(flying, SixDofFlying):
+        raise NotCompiledError(f"the plant {flight.plant} has no closed form")
+    period, last, readers = flight.guidance_period, flight.periods, flying.readers
+    stall, frame = flying.stall, flying.frame
+    record = struct.Struct(f"{len(readers) + 1}d")
+
+    def fly(compiled: Callable[..., Any], held: Any, rows: _Rows, watched: bool) -> _Progress:
+        values, known = bytearray(record.size), _known(flight)
+        read, before = np.frombuffer(values), flying.heading()
+        for k in range(last + 1):
+            record.pack_into(values, 0, *[get() for get in readers], before)
+            ended, command = compiled(read, *rows, k, k == 0, stall, frame, known, held)
+            if ended == NOT_FLYING:
+                if not watched:  # it may end here
+                    yield COMPLETED, k
+                flying.judge(State._make(rows.table[k, 1 : 1 + len(State._fields)].tolist()), period)
+                ended, command = compiled(read, *rows, k, True, stall, frame, known, held)
+            else:
+                flying.stalled_for = 0.0
+            if watched or ended != COMPLETED or k == last:
+                yield ended, k + 1
+            if ended != COMPLETED:
+                return
+            if k < last:
+                before = flying.fly(command, period)
+
+    return _Ready(reading(look), fly)
+
+
+def _known(flight: Flight) -> tuple[float, ...]:
+    """What of a flight does not change: see `looking`."""
+    instruments = Instruments(flight)
+    range_ = flight.metrics.monitoring_range or math.inf
+    wind = map(float, instruments.wind)
+    return flight.guidance_period, flight.start.airspeed, *wind, instruments.scale, range_
 
 
 def _flown(
     flight: Flight, watch: loop.Watch | None, ready: _Ready, compiled: Kernel, held: tuple[Any, ...]
 ) -> FlightLog:
     """The log of the flight. Raises `NotCompiledError` where it is left to Python."""
-    period, last, instruments = flight.guidance_period, flight.periods, Instruments(flight)
+    period, last = flight.guidance_period, flight.periods
     target = _target(flight.target, period, last)
-    seen, rows = _known(flight, target)
+    seen, estimates = _seen(flight, target)
     table, told = (np.empty((last + 1, n)) for n in (len(COLUMNS), len(compiled.told)))
-    fixed = (
-        period, flight.start.altitude, flight.start.airspeed, *map(float, instruments.wind), instruments.scale,
-        flight.metrics.monitoring_range or math.inf,
-    )  # fmt: skip
-    air, drift = ready.air.sampled(ready.late[-1], last)
-    before = target, seen, air, drift, instruments.turns(last + 1), told, ready.late, ready.line
-    done, state, ended = 0, (ready.now, ready.states), COMPLETED
-    outcome, reason = Outcome.COMPLETED, ""
+    rows = _Rows(table, target, seen, Instruments(flight).turns(last + 1), told)
+    done, outcome, reason = 0, Outcome.COMPLETED, ""
 
     def log_so_far() -> FlightLog:
         channels = {f"law_{name}": told[:done, i] for i, name in enumerate(compiled.told)}
         log = FlightLog(flight, outcome, reason, table[:done], channels)
-        return loop.completed(log, rows[:done] if rows is not None else None)
+        return loop.completed(log, estimates[:done] if estimates is not None else None)
 
-    while done <= last and ended == COMPLETED:
-        end = min(last + 1, done + _AT_ONCE if done else 1) if watch else last + 1
-        try:
-            ended, done, *state = compiled.fly(table, *before, (done, end, last), fixed, *state, held)
-        except (Exception, SystemExit) as error:
-            _judge(ready.function, error)
-            raise NotCompiledError(f"an error in the flight: {error}") from None
-        if ended == UNUSUAL:
-            raise NotCompiledError("the law answers what is no finite number")
-        if watch:
-            watch((done - 1) * period, log_so_far)
-    if ended == TARGET_LOST:
-        lost = loop.lost(flight)
-        outcome, reason = lost.outcome, str(lost)
+    progress = ready.fly(compiled.fly, held, rows, watch is not None)
+    try:
+        while now := _next(progress, ready.function):
+            ended, done = now
+            if ended == UNUSUAL:
+                raise NotCompiledError("the law answers what is no finite number")
+            if watch:
+                watch((done - 1) * period, log_so_far)
+            if ended == TARGET_LOST:
+                raise loop.lost(flight)
+    except End as end:
+        outcome, reason = end.outcome, str(end)
     return log_so_far()
+
+
+def _next(progress: _Progress, function: Any) -> tuple[int, int] | None:
+    """The next progress of a flight; None when it has ended."""
+    try:
+        return next(progress, None)
+    except End:
+        raise
+    except (Exception, SystemExit) as error:
+        _judge(function, error)
+        raise NotCompiledError(f"an error in the flight: {error}") from None
 
 
 def _judge(function: Any, error: BaseException) -> None:
@@ -173,7 +274,7 @@ def _moving(target: Target, period: float, last: int) -> Array:
     return rows
 
 
-def _known(flight: Flight, target: Array) -> tuple[Array, list[tuple[float, ...]] | None]:
+def _seen(flight: Flight, target: Array) -> tuple[Array, list[tuple[float, ...]] | None]:
     """The target as the law knows it at each row, and the rows of an `Estimation`."""
     if not flight.estimator.filters:
         truth = TargetState(*target.T)

@@ -30,7 +30,8 @@ _ARITHMETIC = {
         "copysign", "remainder", "fmod", "hypot", "isfinite", "isnan", "radians", "degrees",
     )
 } | {math.pow: "power", dot: "dot"}  # fmt: skip
-_ALLOCATES = "jit(_nrt=True)"  # a law of one's own may make lists: references are counted there
+_OURS = "jit(forceinline=True)"
+_OWN = "jit(_nrt=True)"  # a law of one's own may make lists: references are counted there
 _REFUSED = {
     ast.Nonlocal: "it keeps a variable from one call to the next",
     ast.Global: "it changes a variable of its module",
@@ -196,7 +197,7 @@ class _Writer(ast.NodeTransformer):
             for one in made if isinstance(made, list) else [made] if made else []:
                 text = ast.unparse(ast.fix_missing_locations(one))
                 lines += [f"    {line}" for line in text.splitlines()]
-        decorator = "jit" if _is_ours(self._of.function) else _ALLOCATES
+        decorator = _OURS if _is_ours(self._of.function) else _OWN
         return f"@{decorator}\ndef {name}({', '.join(names)}):\n" + "\n".join(lines or ["    pass"])
 
     def _kept(self) -> list[str]:

@@ -15,11 +15,12 @@ from harness.plants.level import Motion, Move, States, carried, level_state
 from harness.plants.state import State
 from harness.world.target import Leg, TargetState
 
-COMPLETED, TARGET_LOST, UNUSUAL = 0, 1, 2  # how the loop ended; unusual: the flight is left to Python
+COMPLETED, TARGET_LOST, UNUSUAL, NOT_FLYING = range(4)  # how it ended; unusual: the flight is left to Python
 _TARGET = 1 + len(State._fields)  # the first column of the target
 _GUIDANCE = _TARGET + len(TargetState._fields)
 assert len(LOOP_COLUMNS) == _GUIDANCE + 6
 
+Look = Callable[..., tuple[int, float]]
 Step = Callable[[Motion, States, float, float, int, Any], tuple[Motion, States]]
 
 
@@ -72,12 +73,56 @@ def moving(at: Callable[[Leg, float], TargetState]) -> Callable[..., Any]:
     return fill
 
 
-def flown(law: LawStep, step: Step) -> Callable[..., Any]:
-    """The loop with this law and this plant."""
+def looking(law: LawStep) -> Look:
+    """What is done at the beginning of a period: the law sees, answers, and the row is written."""
+
+    def look(table: Any, target: Any, estimate: Any, noise: Any, told: Any, k: int, state: State, known: Any) -> Any:
+        """How the flight ended, and the command; `known` is what of a flight does not change."""
+        period, nominal_airspeed, W_x, W_y, scale, monitoring_range = known
+        time = k * period
+        v_a, psi, v_x, v_y = state.airspeed, state.heading, state.velocity_north, state.velocity_east
+        if scale != 1.0:
+            v_a = scale * v_a
+        if len(noise):
+            v_x, v_y = turned(v_x, v_y, noise[k])
+            psi = heading_in((W_x, W_y), v_x, v_y)
+        if state.wind_north != W_x or state.wind_east != W_y:
+            psi = heading_in((W_x, W_y), v_x, v_y)
+        seen = Observation(
+            state.north, state.east, v_x, v_y, v_a, psi, state.heading_rate, state.bank, state.roll_rate,
+            nominal_airspeed, W_x, W_y, estimate[k, 0], estimate[k, 1], estimate[k, 2], estimate[k, 3],
+            estimate[k, 4], estimate[k, 5], time,
+        )  # fmt: skip
+        guidance = law(seen)
+        if not math.isfinite(guidance.heading_rate):
+            return UNUSUAL, 0.0
+        table[k, 0] = time
+        for i in range(len(state)):
+            table[k, 1 + i] = state[i]
+        for i in range(6):
+            table[k, _TARGET + i] = target[k, i]
+        table[k, _GUIDANCE] = guidance.heading_rate
+        table[k, _GUIDANCE + 1] = guidance.range_error
+        table[k, _GUIDANCE + 2] = guidance.sliding_variable
+        table[k, _GUIDANCE + 3] = guidance.heading_error
+        table[k, _GUIDANCE + 4] = guidance.feed_forward
+        table[k, _GUIDANCE + 5] = guidance.unlimited_command
+        for i in range(6, len(guidance)):
+            told[k, i - 6] = guidance[i]
+        x_r, y_r = state.north - target[k, 0], state.east - target[k, 1]
+        if monitoring_range < math.inf and math.hypot(x_r, y_r) > monitoring_range:
+            return TARGET_LOST, 0.0
+        return COMPLETED, guidance.heading_rate
+
+    return look
+
+
+def flown(look: Look, step: Step) -> Callable[..., Any]:
+    """The loop with a law that looks, and this plant."""
 
     def fly(
-        table: Any, target: Any, estimate: Any, air: Any, drift: Any, noise: Any, told: Any, late: Any, line: Any,
-        rows: Any, fixed: Any, now: Any, states: States,
+        table: Any, target: Any, estimate: Any, noise: Any, told: Any, air: Any, drift: Any, late: Any, line: Any,
+        rows: Any, altitude: float, known: Any, now: Any, states: States,
     ) -> Any:  # fmt: skip
         """Fills the rows of the table from `first` on, until `end`; a flight ends with the row `last`.
 
@@ -87,46 +132,15 @@ def flown(law: LawStep, step: Step) -> Callable[..., Any]:
         """
         first, end, last = rows
         commands, whole, parts = late
-        period, altitude, nominal_airspeed, W_x, W_y, scale, monitoring_range = fixed
         x, y, v_a, psi, rate, bank, roll_rate, bank_command = now
         moved = Motion(x, y, v_a, psi, rate, bank, roll_rate, bank_command)
         for k in range(first, end):
-            time = k * period
             state = level_state(moved, altitude, air[k, 0], air[k, 1], air[k, 2])
-            v_a, psi, v_x, v_y = state.airspeed, state.heading, state.velocity_north, state.velocity_east
-            if scale != 1.0:
-                v_a = scale * v_a
-            if len(noise):
-                v_x, v_y = turned(v_x, v_y, noise[k])
-                psi = heading_in((W_x, W_y), v_x, v_y)
-            if state.wind_north != W_x or state.wind_east != W_y:
-                psi = heading_in((W_x, W_y), v_x, v_y)
-            seen = Observation(
-                state.north, state.east, v_x, v_y, v_a, psi, state.heading_rate, state.bank, state.roll_rate,
-                nominal_airspeed, W_x, W_y, estimate[k, 0], estimate[k, 1], estimate[k, 2], estimate[k, 3],
-                estimate[k, 4], estimate[k, 5], time,
-            )  # fmt: skip
-            guidance = law(seen)
-            if not math.isfinite(guidance.heading_rate):
-                return UNUSUAL, k, now, states
-            table[k, 0] = time
-            for i in range(len(state)):
-                table[k, 1 + i] = state[i]
-            for i in range(6):
-                table[k, _TARGET + i] = target[k, i]
-            table[k, _GUIDANCE] = guidance.heading_rate
-            table[k, _GUIDANCE + 1] = guidance.range_error
-            table[k, _GUIDANCE + 2] = guidance.sliding_variable
-            table[k, _GUIDANCE + 3] = guidance.heading_error
-            table[k, _GUIDANCE + 4] = guidance.feed_forward
-            table[k, _GUIDANCE + 5] = guidance.unlimited_command
-            for i in range(6, len(guidance)):
-                told[k, i - 6] = guidance[i]
-            x_r, y_r = state.north - target[k, 0], state.east - target[k, 1]
-            if monitoring_range < math.inf and math.hypot(x_r, y_r) > monitoring_range:
-                return TARGET_LOST, k + 1, now, states
+            ended, command = look(table, target, estimate, noise, told, k, state, known)
+            if ended != COMPLETED:
+                return ended, k + 1, now, states
             if k < last:
-                commands[k] = guidance.heading_rate
+                commands[k] = command
                 for i in range(len(parts)):
                     given, part = k - whole - (len(parts) - 1 - i), k * len(parts) + i
                     rate = commands[given] if given >= 0 else 0.0

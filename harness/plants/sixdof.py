@@ -4,7 +4,7 @@ In this order: trimming a model, engaging its inner loop, flying it.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -168,14 +168,14 @@ class SixDof:
     rate_trim: bool
     errors: Errors = _NO_ERRORS
 
-    def start(self, start: Start, air: Air) -> "_SixDofFlying":
+    def start(self, start: Start, air: Air) -> "SixDofFlying":
         if not start.altitude > GROUND:
             raise PlantError("start.altitude", f"{start.altitude:g} m is not above {GROUND:g} m, where flights end")
         limits = aircraft.limits(self.airframe)
         fdm = load(self.airframe, self.step, self.errors)
         if adopted := aircraft.adopted(self.airframe):
             self._engage_adopted(fdm, adopted, start, air)
-            return _SixDofFlying(fdm, self.step, start, air, limits.stall, _gusts(fdm, air) if len(air.gusts) else None)
+            return SixDofFlying(fdm, self.step, start, air, limits.stall, _gusts(fdm, air) if len(air.gusts) else None)
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:
@@ -188,7 +188,7 @@ class SixDof:
             _connect(fdm, False)
             fdm.run_ic()
             _connect(fdm, True)
-        return _SixDofFlying(fdm, self.step, start, air, limits.stall, gusts)
+        return SixDofFlying(fdm, self.step, start, air, limits.stall, gusts)
 
     def _engage_adopted(self, fdm: Fdm, adopted: Mapping[str, Any], start: Start, air: Air) -> None:
         """Trims an adopted model in the wind tunnel, hands it to its inner loop, and lets it fly."""
@@ -246,86 +246,95 @@ def _gusts(fdm: Fdm, air: Air) -> Iterator[None]:
         yield
 
 
-class _SixDofFlying:
+Frame = tuple[float, float, float, float, float, float, float]
+"""What turns readings of JSBSim into a state: the position at the start, m, the steady wind and the wind in which the
+aircraft was trimmed, m/s, each north and east, and the step, s."""
+
+
+def state_of(read: Sequence[float], before: float, frame: Frame) -> State:
+    """The state, from the values of `_READ`; `before` is the heading one step ago: the rate is the mean over it."""
+    (
+        n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z,
+        aileron, elevator, rudder, throttle, gust_x, gust_y, gust_z,
+    ) = read  # fmt: skip
+    north, east, W_x, W_y, start_x, start_y, step = frame
+    v_n, v_e = FT * v_n, FT * v_e
+    heading = math.atan2(v_e - W_y, v_n - W_x)
+    return State._make(
+        (
+            north + FT * n, east + FT * e, v_n, v_e, FT * V,
+            heading, wrap(heading - before) / step, phi, p, FT * h, FT * v_d, theta, psi, q, r,
+            phi_c, alpha, beta, GRAVITY * N_y, N_z, aileron, elevator, rudder, throttle,
+            start_x + FT * gust_x, start_y + FT * gust_y, FT * gust_z,
+        )
+    )  # fmt: skip
+
+
+def is_flying(state: State, stall: float) -> bool:
+    """Whether the aircraft is above the ground, below an angle of attack, rad, and not on its back."""
+    return state.altitude > GROUND and abs(state.bank) < DEPARTURE_BANK and state.angle_of_attack < stall
+
+
+class SixDofFlying:
+    """The aircraft in flight, in JSBSim."""
+
     def __init__(
-        self,
-        fdm: Fdm,
-        step: float,
-        start: Start,
-        air: Air,
-        stall: float,
-        gusts: Iterator[None] | None,
+        self, fdm: Fdm, step: float, start: Start, air: Air, stall: float, gusts: Iterator[None] | None
     ) -> None:
-        self.fdm = fdm
+        self.fdm, self.stall = fdm, stall
+        self.readers = [node(fdm, name).get_double_value for name in _READ]
+        self.frame: Frame = (*start.position, *air.steady, *air.horizontal(0), step)
         self._run: Callable[[], bool] = fdm.run
         self._gusts = gusts
-        self._readers = [node(fdm, name).get_double_value for name in _READ]
-        self._velocity_north, self._velocity_east = self._readers[2:4]
+        self._velocity_north, self._velocity_east = self.readers[2:4]
         self._command = node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
-        self._step = step
-        self._north, self._east = start.position
-        self._wind, self._at_start = air.steady, air.horizontal(0)
-        self._stall, self._stalled_for = stall, 0.0
-        self.state = self._read(self._heading())
+        self.stalled_for = 0.0
+        self.state = self.read(self.heading())
 
     def advance(self, heading_rate: float, period: float) -> None:
+        self.state = state = self.read(self.fly(heading_rate, period))
+        if is_flying(state, self.stall) and math.isfinite(sum(state)):
+            self.stalled_for = 0.0
+        else:
+            self.judge(state, period)
+
+    def fly(self, heading_rate: float, period: float) -> float:
+        """Flies on, and gives the heading one step before the end, rad; what is then is not looked at."""
         self._command(heading_rate)
-        run, gusts, steps = self._run, self._gusts, round(period / self._step)
+        run, gusts, steps = self._run, self._gusts, round(period / self.frame[-1])
         if gusts is None:
             for _ in range(steps - 1):
                 run()
-            before = self._heading()
+            before = self.heading()
         else:
             for _ in range(steps - 1):
                 next(gusts)
                 run()
-            before = self._heading()
+            before = self.heading()
             next(gusts)
         run()
-        self.state = state = self._read(before)
-        if not (
-            state.altitude > GROUND
-            and abs(state.bank) < DEPARTURE_BANK
-            and state.angle_of_attack < self._stall
-            and math.isfinite(sum(state))
-        ):
-            self._judge(state, period)
-        else:
-            self._stalled_for = 0.0
+        return before
 
-    def _judge(self, state: State, period: float) -> None:
+    def heading(self) -> float:
+        """psi_a, rad: the direction of (ground velocity - steady wind)."""
+        W_x, W_y = self.frame[2:4]
+        return math.atan2(FT * self._velocity_east() - W_y, FT * self._velocity_north() - W_x)
+
+    def read(self, before: float) -> State:
+        """The state now: see `state_of`."""
+        return state_of([get() for get in self.readers], before, self.frame)
+
+    def judge(self, state: State, period: float) -> None:
+        """Of an aircraft that is not flying, or that is nowhere. Raises `End`, of a stall when it has lasted."""
         if not all(map(math.isfinite, state)):
             raise End(Outcome.INVALID, "a number of the simulated aircraft is not finite")
         if state.altitude <= GROUND:
             raise End(Outcome.GROUND, f"below {GROUND:g} m")
         if abs(state.bank) >= DEPARTURE_BANK:
             raise End(Outcome.DEPARTED, f"bank of {math.degrees(state.bank):.0f} deg")
-        self._stalled_for += period
-        if self._stalled_for > STALL_TIME:
+        self.stalled_for += period
+        if self.stalled_for > STALL_TIME:
             raise End(Outcome.DEPARTED, f"stalled for {STALL_TIME:g} s")
-
-    def _heading(self) -> float:
-        """psi_a, rad: the direction of (ground velocity - steady wind)."""
-        W_x, W_y = self._wind
-        return math.atan2(FT * self._velocity_east() - W_y, FT * self._velocity_north() - W_x)
-
-    def _read(self, before: float) -> State:
-        """The state now. `before` is the heading one step ago: the heading rate is the mean over that step."""
-        (
-            n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z,
-            aileron, elevator, rudder, throttle, gust_x, gust_y, gust_z,
-        ) = [get() for get in self._readers]  # fmt: skip
-        (W_x, W_y), (start_x, start_y) = self._wind, self._at_start
-        v_n, v_e = FT * v_n, FT * v_e
-        heading = math.atan2(v_e - W_y, v_n - W_x)
-        return State._make(
-            (
-                self._north + FT * n, self._east + FT * e, v_n, v_e, FT * V,
-                heading, wrap(heading - before) / self._step, phi, p, FT * h, FT * v_d, theta, psi, q, r,
-                phi_c, alpha, beta, GRAVITY * N_y, N_z, aileron, elevator, rudder, throttle,
-                start_x + FT * gust_x, start_y + FT * gust_y, FT * gust_z,
-            )
-        )  # fmt: skip
 
 
 class Moment(NamedTuple):

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from harness.checks import model_of_another
 from harness.compiled.engine import why_plain
 from harness.compiled.kernel import is_installed
 from harness.error import HarnessError
@@ -12,7 +13,8 @@ from harness.runs.survey import Survey
 from harness.settings.laws import kind_of_class, short, source_of
 
 ENGINES = ("python", "compiled")
-WORTH = 20.0  # s that the flights take in Python, in one process: a loop is compiled in some seconds
+WORTH = 20.0  # s that are saved, in one process: a loop is compiled in some seconds
+_OF_BODY = 0.07  # share of a 6-DOF flight's time that is saved; of the others nearly all
 
 
 class EngineError(HarnessError):
@@ -33,11 +35,12 @@ def engine_for(size: Survey, asked: str | None, times: float = 1.0) -> Engine:
     """
     if asked == "python" or not size.flights:
         return Engine(False)
-    if asked is None and not (is_installed() and times * _plain(size.typical) >= WORTH):
+    if asked is None and not (is_installed() and times * _saved(size.typical) >= WORTH):
         return Engine(False)
     compiled, notes = False, []
     for flight in size.examples.values():
-        if asked is None and PLANTS[flight.plant].has_body:
+        if model_of_another(flight):  # it may end the process that flies it, which is the workers' business
+            compiled |= asked is not None
             continue
         why = why_plain(flight)
         if why and asked:
@@ -48,9 +51,9 @@ def engine_for(size: Survey, asked: str | None, times: float = 1.0) -> Engine:
     return Engine(compiled, tuple(notes) if compiled or asked is None else ())
 
 
-def _plain(typical: Mapping[str, float]) -> float:
-    """The time that flights take in Python which a compiled loop may save, s."""
-    return sum(seconds for plant, seconds in typical.items() if not PLANTS[plant].has_body)
+def _saved(typical: Mapping[str, float]) -> float:
+    """The time that compiled loops may save, s, of what the flights of each plant take in Python."""
+    return sum(seconds * (_OF_BODY if PLANTS[plant].has_body else 1.0) for plant, seconds in typical.items())
 
 
 def _named(flight: Flight) -> str:
