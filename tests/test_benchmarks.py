@@ -1,5 +1,6 @@
 """The benchmarks run: each on the least that it measures, with its numbers printed."""
 
+import math
 import re
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from benchmarks import (
     compiled,
     flight_speed,
+    guided_falsify,
     help_speed,
     long_logs,
     maps,
@@ -149,6 +151,17 @@ def test_a_long_log_of_each_format_is_read(capsys: pytest.CaptureFixture[str]) -
     _, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines(capsys)]
     assert [row[:2] for row in rows] == [[kind, "2"] for kind in long_logs.WRITERS]
     assert all(float(minutes) > 1.0 and float(memory) > 50.0 for _, _, minutes, memory, _ in rows)
+
+
+def test_a_search_with_a_guide_is_told_beside_one_without() -> None:
+    _, _, first = guided_falsify.searched("gains", 8.0, False, 0, 8)
+    assert 1 <= first <= 8
+    flights = [guided_falsify.Needed("gains", how, [of]) for how, of in (("", first), ("guide", 2.0))]
+    functions = [guided_falsify.Needed("bowl", how, [3.0, math.inf]) for how in ("", "another function")]
+    text = "\n".join(guided_falsify.page(flights, functions, {"gains": 8.0}))
+    row = f"| the gains, by the activity of the command | `command_activity_deg_s2 < 8` | {first} ({first}) | 2 (2) |"
+    assert row in text
+    assert f"| bowl | 3 (> {guided_falsify.MOST}) | 3 (> {guided_falsify.MOST}) |" in text
 
 
 @pytest.mark.parametrize("heading", ["On SLURM", "On Kubernetes"])

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import harness
+from benchmarks.guided_falsify import probed
 from benchmarks.planted_failures import flights_needed, needed_at_random
 from harness.review.reading import read_logs
 from harness.settings import load_flight
@@ -113,9 +114,43 @@ def test_a_real_aircraft_loses_its_target_and_the_search_finds_how(tmp_path: Pat
     assert harness.simulate(flight).outcome == "target_lost"
 
 
+def test_a_guide_that_is_right_halves_the_flights_and_one_that_is_wrong_hides_no_failure() -> None:
+    unguided, right, wrong = (
+        [probed("dips", guide, seed, 100)[-1] for seed in range(3)]
+        for guide in ("", "the same function", "another function")
+    )
+    assert sum(right) <= 0.5 * sum(unguided)
+    assert max(wrong) <= 100
+
+
+def test_a_search_of_a_real_aircraft_is_guided_by_a_cheaper_plant_and_goes_on_with_more_flights(tmp_path: Path) -> None:
+    file = write(tmp_path / "moving.toml", KINEMATIC.replace("kinematic", "sixdof").replace("60.0", "20.0"))
+    words = ("--requirement", "range_error_peak_m < 150", "--json")
+    falsify(file, tmp_path / "out", *words, "--flights", 4)
+    told = json.loads(falsify(file, tmp_path / "out", *words, "--flights", 8).splitlines()[-1])
+    assert told["guide"]["plant"] == "coordinated"
+    assert told["guide"]["broken"] > 0
+    assert told["first_broken"] <= 2  # the first one that is no uniform draw
+    assert (told["trials"], told["uniform"]["trials"]) == (8, 2)
+    flown = harness.load_results(tmp_path / "out")["plant"].value_counts()
+    assert 32 < flown["coordinated"] <= 64  # one that is asked for twice is flown once
+    assert flown["sixdof"] == 8
+    assert load_flight(tmp_path / "out" / "counterexample.toml").plant == "sixdof"
+    alone = json.loads(falsify(file, tmp_path / "alone", *words, "--flights", 2, "--guide", "none").splitlines()[-1])
+    assert alone["guide"] is None
+
+
+def test_a_plant_without_the_metric_is_no_guide(tmp_path: Path) -> None:
+    file = write(tmp_path / "moving.toml", KINEMATIC.replace("kinematic", "sixdof").replace("60.0", "5.0"))
+    out = falsify(file, tmp_path / "out", "--requirement", "sideslip_peak_deg < 30", "--flights", 2)
+    assert "coordinated has no sideslip_peak_deg, so it was no guide" in out
+    assert "10 flown, 0 earlier" in out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["--requirement", "laps > 1", "--guide", "lagged"], "must be a cheaper plant than kinematic"),
         (["--requirement", "speed < 5"], "--requirement 'speed < 5': "),
         (["--requirement", "laps"], "--requirement 'laps': "),
         (["--requirement", "laps > 1", "--over", "law.k2=3"], "--over law.k2=3: must be KEY=LO:HI"),

@@ -158,7 +158,7 @@ CALLS: Mapping[str, Sequence[str]] = {
     "falsify": [
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement WORD",
         f"FILE --out OUT {SHORT} --workers 0 --flights 2 --over law.k2=1:9 --requirement range_error_peak_m<5 --json",
-        "MATRIX --out OUT --over WORD --requirement laps>1",
+        "MATRIX --out OUT --over WORD --requirement laps>1 --guide WORD",
         "FILE --out OUT --over law.k2=1:9 --requirement outcome=WORD",
         "FILE --out OUT --over law.k2=1:9 --requirement laps>1 --dask OUT/WORD.json",
     ],

@@ -21,6 +21,12 @@ _MOST_LINES = 5  # of the table of the worst
 @click.option(
     "--flights", type=click.IntRange(1), default=200, show_default=True, metavar="N", help="At most N flights."
 )
+@click.option(
+    "--guide",
+    "guiding",
+    type=click.Choice(["kinematic", "lagged", "coordinated", "none"]),
+    help="Search this cheaper plant first, as a guide. [default: coordinated for 6-DOF flights]",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search, not of the flights.")
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
@@ -37,6 +43,7 @@ def falsify(
     asked: str,
     out: Path,
     flights: int,
+    guiding: str | None,
     seed: int,
     workers: int | None,
     dask: str | None,
@@ -52,6 +59,9 @@ def falsify(
     from that value over the value; below 0 it breaks the requirement. What a flight does not have breaks it as well.
     Each trial is flown over all flights of the [matrix] of FILE, and judged by the worst of them; a key that is
     searched is no axis of it.
+
+    A search of 6-DOF flights begins with 64 trials on a cheaper plant, which cost little and do not count among the N
+    flights. Where they do worst is where the search looks first, and, as far as its own flights bear that out, next.
 
     At least every fourth trial is a uniform draw from the ranges (of their logarithms, where a positive range of a
     decade or more is searched by factors). They give a 95 % upper bound on the share of the ranges that breaks the
@@ -74,14 +84,22 @@ def falsify(
     from dataclasses import replace
 
     from harness.cli._input import BadInput
-    from harness.cli._matrix import engine_of, flown_out, many_flights, print_survey, processes, surveyed
+    from harness.cli._matrix import (
+        counted,
+        engine_of,
+        flown_out,
+        many_flights,
+        print_survey,
+        processes,
+        surveyed,
+    )
     from harness.cli._paths import writable_folder
     from harness.cli._progress import busy
     from harness.error import HarnessError
     from harness.requirement import RequirementError, requirement
     from harness.runs.results import export
     from harness.search.dimension import dimension
-    from harness.search.falsify import falsification
+    from harness.search.falsify import GUIDING, falsification, guide_to
     from harness.search.files import write_counterexample, write_probes
     from harness.search.space import Space
     from harness.settings import read_settings
@@ -93,7 +111,8 @@ def falsify(
         raise BadInput(f"--requirement {asked!r}: {error}") from None
     try:
         space = Space(read_settings(file, overrides), [dimension(text) for text in over])
-        search = falsification(space, required, flights=flights, seed=seed)
+        guide = guide_to(space, guiding) if guiding != "none" else None
+        search = falsification(space, required, flights=flights, seed=seed, guide=guide)
         _, middle, _ = (surveyed(matrix) for matrix in space.tried)
         writable_folder(out)
         if not as_json:
@@ -102,10 +121,15 @@ def falsify(
             for one in space.dimensions:
                 click.echo(f"  {one}{', by factors' if one.is_log else ''}")
             click.echo(f"to be broken: {required}")
-        trials = flights // len(space.conditions)
-        typical = {plant: trials * seconds for plant, seconds in middle.typical.items()}
+            if search.guide:
+                click.echo(f"first {counted(search.guide.flights, 'flight')} on {search.guide.plant}, as a guide")
+        sizes = [(middle, flights // len(space.conditions))]
+        if guide:
+            sizes.append((surveyed(guide.tried[1]), GUIDING))
+        typical = {plant: times * seconds for size, times in sizes for plant, seconds in size.typical.items()}
         with many_flights(workers, dask, retry, flight_timeout) as options:
-            options = replace(options, typical=typical, compiled=engine_of(middle, engine, trials))
+            compiled = [engine_of(size, engine, times) for size, times in sizes]
+            options = replace(options, typical=typical, compiled=any(compiled))
             progress = flown_out(search.fly(out, options), out)
         with busy("writing the table of flights"):
             export(out)
@@ -152,6 +176,9 @@ def _print_found(search: Falsification, counterexample: Path | None) -> None:
         click.echo(f"none in {flown}; above is the one that came closest" if listed else f"none in {flown}")
     for what, count in Counter(search.refused).most_common(_MOST_LINES):
         click.echo(f"{counted(count, 'trial')} refused before it was flown: {what}")
+    if search.guide:
+        broken = f"broke it in {len(search.guide.broken)} of {counted(len(search.guide.trials), 'trial')}, as a guide"
+        click.echo(f"{search.guide.plant} {broken if search.guide.knows else f'has no {name}, so it was no guide'}")
     bound = search.bound
     failed = f", and {bound.failed} failed and count as broken" if bound.failed else ""
     click.echo(
@@ -181,6 +208,8 @@ def _json(search: Falsification, counterexample: Path | None) -> str:
             "worst": found,
             "counterexample": counterexample and str(counterexample),
             "uniform": {**bound._asdict()},
+            "guide": search.guide
+            and {"plant": search.guide.plant, "trials": len(search.guide.trials), "broken": len(search.guide.broken)},
         },
         allow_nan=False,
     )

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 from harness.error import SettingsError
+from harness.plants.ladder import PLANTS, rung
 from harness.plants.plant import Outcome
 from harness.requirement import OUTCOME, Requirement
 from harness.runs.run import Options, Progress
@@ -17,6 +18,7 @@ from harness.search.space import Space
 from harness.search.tune import AT_ONCE, PATIENCE
 from harness.verdict.statistics import upper_bound
 
+GUIDING = 64  # trials of a guide; the same for any number of flights, so that a search goes on with more
 _REFUSED = 1.0  # robustness, for the prober alone, of settings that no flight can have
 _UNKNOWN = -1.0  # robustness of a number that a flight does not have, as of a truth value that is wrong
 
@@ -51,6 +53,11 @@ class Falsification:
     trials: list[Trial]
     refused: list[str]  # the first line of what is wrong, of settings that no flight can have
     progress: Progress
+    guide: "Falsification | None" = None  # the same search on a cheaper plant, which is flown first
+    prober: Prober = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.prober = Prober(len(self.space.dimensions), self.seed)
 
     def fly(self, folder: Path, options: Options) -> Iterator[Progress]:
         """Searches, and yields the progress: see `fly_search`."""
@@ -58,7 +65,9 @@ class Falsification:
 
     def batches(self) -> Iterator[Sequence[Candidate]]:
         """The candidates to be flown next; each batch is judged before the next one is asked for."""
-        prober = Prober(len(self.space.dimensions), self.seed)
+        if self.guide:
+            yield from self._guided(self.guide)
+        prober = self.prober
         conditions = len(self.space.conditions)
         count, size = self.flights // conditions, -(-AT_ONCE // conditions)
         while len(self.trials) < count:
@@ -79,6 +88,16 @@ class Falsification:
                     prober.tell(probe, trial.robustness)
             if self.worst:
                 self.progress.note = f"{len(self.broken)} broken, worst {self.value(self.worst)}"
+
+    def _guided(self, guide: "Falsification") -> Iterator[Sequence[Candidate]]:
+        """The batches of the guide, which the prober knows afterwards; one alone where it knows no such number."""
+        for cheap in guide.batches():
+            if guide.trials and not guide.knows:
+                self.progress.total -= (GUIDING - len(guide.trials)) * len(guide.space.conditions)
+                return
+            yield cheap
+            self.progress.note = f"on {guide.plant}, as a guide: {guide.progress.note}"
+        self.prober = Prober(len(self.space.dimensions), self.seed, guide.prober.guide)
 
     def _asked(self, prober: Prober, uniform: bool) -> tuple[Probe, Candidate] | None:
         """Settings that a flight can have; None when none are found."""
@@ -101,6 +120,16 @@ class Falsification:
             return Trial(candidate, uniform, None, False, decisive)
         broken = not all(map(self.requirement.is_met, candidate.facts))
         return Trial(candidate, uniform, distances[decisive], broken, decisive)
+
+    @property
+    def plant(self) -> str:
+        """The highest plant of the conditions."""
+        return max((str(flight.plant) for flight in self.space.middle.flights), key=rung)
+
+    @property
+    def knows(self) -> bool:
+        """Whether any flight had what the requirement is about."""
+        return any(facts.get(self.requirement.name) is not None for t in self.trials for facts in t.candidate.facts)
 
     @property
     def worst(self) -> Trial | None:
@@ -132,12 +161,42 @@ class Falsification:
         return "unknown" if fact is None else f"{fact:.4g}" if isinstance(fact, float) else str(fact).lower()
 
 
-def falsification(space: Space, requirement: Requirement, *, flights: int, seed: int = 0) -> Falsification:
-    """A search, not begun. Raises `SearchError`."""
+def falsification(
+    space: Space, requirement: Requirement, *, flights: int, seed: int = 0, guide: Space | None = None
+) -> Falsification:
+    """A search, not begun; `guide`: the space on the plant that guides it. Raises `SearchError`."""
     conditions = len(space.conditions)
     if flights < conditions:
         raise SearchError(f"--flights is {flights}, must be {conditions} at least, which is one trial")
+    total = flights // conditions * conditions
+    cheap = None
+    if guide:
+        guiding = GUIDING * len(guide.conditions)
+        cheap = falsification(guide, requirement, flights=guiding, seed=seed)
+        total += guiding
     return Falsification(
         space=space, requirement=requirement, flights=flights, seed=seed, trials=[], refused=[],
-        progress=Progress(flights // conditions * conditions),
+        progress=Progress(total), guide=cheap,
     )  # fmt: skip
+
+
+def guide_to(space: Space, asked: str | None) -> Space | None:
+    """The space on the plant that is to guide a search: the one that is asked for, or else the nearest cheaper one.
+
+    Without a word, only 6-DOF flights have a guide, where it can fly their settings. Raises `SearchError` and
+    `SettingsError`.
+    """
+    plants = {str(flight.plant) for flight in space.middle.flights}
+    if asked is not None:
+        if not all(rung(asked) < rung(plant) for plant in plants):
+            raise SearchError(f"--guide {asked}: must be a cheaper plant than {', '.join(sorted(plants, key=rung))}")
+        return space.on(asked)
+    cheap = [name for name, kind in PLANTS.items() if not kind.has_body]
+    if not all(PLANTS[plant].has_body for plant in plants):
+        return None
+    try:
+        guide = space.on(cheap[-1])
+        guide.middle  # noqa: B018  # whether it can be flown
+    except SettingsError:
+        return None
+    return guide

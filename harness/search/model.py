@@ -15,7 +15,9 @@ Array = NDArray[np.float64]
 
 _LOOKED_AT = 512  # points, of which the best is asked for; as many again nearer and nearer to it
 _NEARER = (0.1, 0.03, 0.01)  # of the range
-_NOISE = 1e-6  # variance, of standardised values
+LENGTH = 0.5  # of the range: over which values are expected to be alike
+NOISE = 1e-3  # variance, of standardised values, that is expected
+_NOISE = 1e-6  # the least
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +44,10 @@ class Model:
             except np.linalg.LinAlgError:
                 return 1e10
             a = solve_triangular(L, y, lower=True)
-            prior = np.sum((logs[:-1] - math.log(0.5)) ** 2) / 2.0 + (logs[-1] - math.log(1e-3)) ** 2 / 8.0
+            prior = np.sum((logs[:-1] - math.log(LENGTH)) ** 2) / 2.0 + (logs[-1] - math.log(NOISE)) ** 2 / 8.0
             return float(0.5 * a @ a + np.log(np.diag(L)).sum() + prior)
 
-        lengths, noise = (like.lengths, like.noise) if like else (np.full(x.shape[1], 0.5), 1e-3)
+        lengths, noise = (like.lengths, like.noise) if like else (np.full(x.shape[1], LENGTH), NOISE)
         start = np.log(np.append(lengths, noise))
         bounds = [(math.log(0.03), math.log(10.0))] * x.shape[1] + [(math.log(1e-6), 0.0)]
         found = minimize(unlikely, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 10 if like else 30}).x
@@ -60,6 +62,8 @@ class Model:
 
     def at(self, x: Array) -> tuple[Array, Array]:
         """Mean and standard deviation at these points."""
+        if not len(self.x):
+            return np.full(len(x), self.mean), np.full(len(x), self.scale)
         K = _matern(self.x, self.x, self.lengths) + self.noise * np.eye(len(self.x))
         L = cholesky(K, lower=True)
         k = _matern(self.x, x, self.lengths)
@@ -81,11 +85,14 @@ def log_improvement(mean: Array, deviation: Array, best: float) -> Array:
     return np.asarray(np.log(np.maximum(improvement, 1e-300)) + np.log(deviation))
 
 
-def most_promising(promise: Callable[[Array], Array], centre: Array, noise: np.random.Generator) -> Array:
-    """The point of the unit cube where this is largest: sought everywhere, at `centre`, and around the best of them."""
-    x = np.vstack([qmc.Halton(len(centre), rng=noise).random(_LOOKED_AT), centre])
+def most_promising(promise: Callable[[Array], Array], centres: Array, noise: np.random.Generator) -> Array:
+    """The point of the unit cube where this is largest: sought everywhere, at `centres`, and around the best of them.
+
+    `centres`: one point, or several in rows.
+    """
+    x = np.vstack([qmc.Halton(centres.shape[-1], rng=noise).random(_LOOKED_AT), centres])
     for scale in (*_NEARER, 0.0):
-        centre = x[int(np.argmax(promise(x)))]
+        centre: Array = x[int(np.argmax(promise(x)))]
         x = np.clip(centre + scale * noise.standard_normal((_LOOKED_AT, len(centre))), 0.0, 1.0)
         x = np.vstack([x, centre])
     return centre

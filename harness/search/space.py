@@ -20,10 +20,14 @@ class Space:
                 raise SearchError(f"{one.option} {one}: {one.key} is given twice")
             if text := file.overrides.get(("flight", *one.key.split("."))):
                 raise SearchError(f"{one.option} {one}: {text} gives it one value: leave one of them out")
-        self.dimensions = dimensions
+        self.file, self.dimensions = file, dimensions
         lowest = {d.key: d.low for d in dimensions}
         self.matrix = read_matrix(self._with(file, lowest))  # a key that is searched is no axis of it
         self.conditions = list(self.matrix.combinations())
+
+    def on(self, plant: str) -> "Space":
+        """The same space on another plant. Raises `SettingsError` and `SearchError`."""
+        return Space(overridden(self.file, [f"plant={plant}"], "--guide"), self.dimensions)
 
     @property
     def tried(self) -> Sequence[Matrix]:
