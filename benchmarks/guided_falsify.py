@@ -6,6 +6,7 @@ Writes docs/answers/guided_falsify.md.
 
 import math
 import os
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product
@@ -16,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.planted_failures import needed_at_random, planted
+from harness.compiled import engine
 from harness.files import replacing
 from harness.loop import simulate
 from harness.pool import computed
@@ -35,6 +37,7 @@ FILE = Path("experiments/falsify.toml")
 SHARE = 0.01  # of the ranges, in which flights break what is asked
 DRAWN = 150  # flights, from which it is known what that is
 SEEDS = 6
+TIMED = 5  # flights
 MOST = 80  # flights
 LANDSCAPES = ("bowl", "dips")
 DIMENSIONS = 4
@@ -104,6 +107,22 @@ def drawn(weakness: str, seed: int, flights: int) -> list[float]:
     return found
 
 
+def shares_of_time() -> tuple[float, float]:
+    """The processor time of a trial of the guide over that of a 6-DOF flight, by Python and compiled."""
+    space = WEAKNESSES["target"].space()
+    guide = guide_to(space, None)
+    assert guide
+    (own,), (cheap,) = (of.middle.flights for of in (space, guide))
+    took = []
+    for flight, by in ((own, simulate), (cheap, simulate), (cheap, engine.simulate)):
+        by(flight)  # loads and compiles
+        begin = time.process_time()
+        for _ in range(TIMED):
+            assert by(flight).metrics
+        took.append(time.process_time() - begin)
+    return took[1] / took[0], took[2] / took[0]
+
+
 def searched(weakness: str, border: float, guided: bool, seed: int, most: int) -> tuple[str, bool, float]:
     """How many 6-DOF flights a search takes until one breaks what is asked."""
     of = WEAKNESSES[weakness]
@@ -156,7 +175,9 @@ def _cheap(kind: str, guide: str, seed: int) -> Callable[[Array], Array]:
     return lambda x: function(x - moved * way / np.linalg.norm(way))
 
 
-def page(flights: Sequence[Needed], functions: Sequence[Needed], borders: Mapping[str, float]) -> Iterator[str]:
+def page(
+    flights: Sequence[Needed], functions: Sequence[Needed], borders: Mapping[str, float], times: tuple[float, float]
+) -> Iterator[str]:
     """The lines of the page."""
     seeds = len(flights[0].of)
     yield "# A cheaper plant as a guide"
@@ -183,6 +204,8 @@ def page(flights: Sequence[Needed], functions: Sequence[Needed], borders: Mappin
     ]
     yield from markdown(["over", "to be broken", "without a guide", "with the guide"], rows, "llrr")
     yield ""
+    python, compiled = (f"{GUIDING * share:.2g}" for share in times)
+    yield f"In time the {GUIDING} trials cost as much as {python} flights on `sixdof`, compiled as much as {compiled}."
     yield "The airspeed of a cheaper plant deviates elsewhere than that of the aircraft: of it the guide knows nothing."
     yield "`--guide none` searches without a guide; of a metric that the cheaper plant does not have there is none."
     yield ""
@@ -225,7 +248,7 @@ def main(
     known = list(computed(tries, workers))
     functions = [Needed(kind, how, [x for *other, x in known if tuple(other) == (kind, how)]) for kind, how in asked]
     with replacing(page_path) as partial_page:
-        partial_page.write_text("\n".join(page(flights, functions, borders)) + "\n", encoding="utf-8")
+        partial_page.write_text("\n".join(page(flights, functions, borders, shares_of_time())) + "\n", encoding="utf-8")
     print(page_path, *flights, *functions, sep="\n")
     return flights, functions
 

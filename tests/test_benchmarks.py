@@ -158,9 +158,10 @@ def test_a_search_with_a_guide_is_told_beside_one_without() -> None:
     assert 1 <= first <= 8
     flights = [guided_falsify.Needed("gains", how, [of]) for how, of in (("", first), ("guide", 2.0))]
     functions = [guided_falsify.Needed("bowl", how, [3.0, math.inf]) for how in ("", "another function")]
-    text = "\n".join(guided_falsify.page(flights, functions, {"gains": 8.0}))
+    text = "\n".join(guided_falsify.page(flights, functions, {"gains": 8.0}, (0.5, 0.01)))
     row = f"| the gains, by the activity of the command | `command_activity_deg_s2 < 8` | {first} ({first}) | 2 (2) |"
     assert row in text
+    assert "the 64 trials cost as much as 32 flights on `sixdof`, compiled as much as 0.64." in text
     assert f"| bowl | 3 (> {guided_falsify.MOST}) | 3 (> {guided_falsify.MOST}) |" in text
 
 

@@ -60,8 +60,8 @@ def falsify(
     Each trial is flown over all flights of the [matrix] of FILE, and judged by the worst of them; a key that is
     searched is no axis of it.
 
-    A search of 6-DOF flights begins with 64 trials on a cheaper plant, which cost little and do not count among the N
-    flights. Where they do worst is where the search looks first, and, as far as its own flights bear that out, next.
+    A search of 6-DOF flights begins with 64 trials on a cheaper plant, which do not count among the N flights. Where
+    they do worst is where it looks first, and, as far as its own flights bear that out, next.
 
     At least every fourth trial is a uniform draw from the ranges (of their logarithms, where a positive range of a
     decade or more is searched by factors). They give a 95 % upper bound on the share of the ranges that breaks the
