@@ -22,7 +22,7 @@ from harness.log import FlightLog
 from harness.plants.plant import Outcome, Start
 from harness.world.target import Segment, Target
 from harness.world.wind import Gust, Wind
-from tests.builders import EXPERIMENTS, FLIGHT, OwnLaw, digests, invoke, turning, write
+from tests.builders import EXPERIMENTS, FLIGHT, OwnLaw, copied_airframe, digests, invoke, turning, write
 
 # (plant, law, direction, airspeed, limited quantity): each is compiled once, which takes some seconds
 KINDS = (
@@ -215,6 +215,17 @@ def test_a_flight_that_cannot_be_compiled_is_refused_where_that_is_asked(
     ran = invoke("run", EXPERIMENTS / "stationary.toml", "--out", tmp_path, *words, "--engine", "compiled")
     assert ran.exit_code == 2
     assert why in ran.output.splitlines()[-1], ran.output
+
+
+def test_the_parent_of_a_run_flies_no_model_of_somebody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(flight: Flight) -> str:
+        raise AssertionError("flown in the parent")
+
+    monkeypatch.setattr("harness.runs.engine.why_plain", refused)
+    mine = copied_airframe("ultra_stick_25e", tmp_path / "mine")
+    settings = ("--set", "plant=sixdof", "--set", "duration_s=1", "--set", f"aircraft={mine}", "--set", "law.k2=[2,3]")
+    words = ("--out", tmp_path / "out", "--log", "none", "--engine", "compiled", *settings)
+    assert "2 flown, 0 earlier, 0 failed" in invoke("run", EXPERIMENTS / "stationary.toml", *words).output
 
 
 def test_a_law_with_a_memory_is_flown_by_python_which_is_said_once(
