@@ -134,7 +134,7 @@ def channels_of(told: Mapping[int, Mapping[str, float]], rows: int) -> dict[str,
     return columns
 
 
-def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | None) -> FlightLog:
+def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | NDArray[np.float64] | None) -> FlightLog:
     """The log with the columns that the loop does not write: range error, margin, and the target as the law saw it.
 
     `estimates` are the rows of an `Estimation`; None stands for a law that knows the true position and velocity.
@@ -147,7 +147,7 @@ def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | None) -> 
     if estimates is None:
         first = COLUMNS.index(TargetState._fields[0])
         seen[:, :4], seen[:, 4:] = log.table[:, first : first + 4], math.nan
-    elif estimates:
+    elif len(estimates):
         seen[:] = estimates
     return log
 

@@ -274,18 +274,20 @@ def _moving(target: Target, period: float, last: int) -> Array:
     return rows
 
 
-def _seen(flight: Flight, target: Array) -> tuple[Array, list[tuple[float, ...]] | None]:
+def _seen(flight: Flight, target: Array) -> tuple[Array, Array | None]:
     """The target as the law knows it at each row, and the rows of an `Estimation`."""
     if not flight.estimator.filters:
         truth = TargetState(*target.T)
         known = perfect_estimator(flight.estimator)(0, truth)
         return target if known is truth else np.column_stack(np.broadcast_arrays(*known)), None
     estimation = Estimation(flight, flight.target.start())
-    nothing = TargetState(0.0, 0.0, 0.0, 0.0)  # not used
     try:
-        return np.array([estimation.at(k, nothing) for k in range(len(target))]), estimation.rows
+        last = estimation.at(len(target) - 1, TargetState(0.0, 0.0, 0.0, 0.0))  # the truth is not used
     except End as end:
         raise NotCompiledError(str(end)) from None
+    rows, seen = np.array(estimation.rows), np.tile(np.array(last), (len(target), 1))
+    seen[:, :4] = rows[:, :4]  # what no filter estimates is the same throughout
+    return seen, rows
 
 
 @lru_cache(maxsize=16)
