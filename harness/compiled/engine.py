@@ -91,7 +91,7 @@ def _begins(log: FlightLog, plain: FlightLog) -> bool:
     return as_it_does and np.array_equal(plain.whole, log.whole[: len(plain)], equal_nan=True)
 
 
-class _Rows(NamedTuple):
+class _Arrays(NamedTuple):
     """What a kernel reads and fills, row by row."""
 
     table: Array
@@ -108,7 +108,7 @@ class _Ready(NamedTuple):
     """A flight before its first row."""
 
     function: Callable[..., Any]  # what is compiled
-    fly: Callable[[Callable[..., Any], Any, _Rows, bool], _Progress]
+    fly: Callable[[Callable[..., Any], Any, _Arrays, bool], _Progress]
     """By the compiled function and the numbers that it holds, into rows; last, whether somebody watches."""
 
 
@@ -140,7 +140,7 @@ def _in_closed_form(flight: Flight, look: Look, air: Air, flying: Level) -> _Rea
         step, states = in_pieces(motion.commanded, motion.piece, motion.ended), motion.states
         line = np.empty(last * len(parts)), *_line(motion, parts, last)
 
-    def fly(compiled: Callable[..., Any], held: Any, rows: _Rows, watched: bool) -> _Progress:
+    def fly(compiled: Callable[..., Any], held: Any, rows: _Arrays, watched: bool) -> _Progress:
         velocity, drift = air.sampled(late[-1], last)
         done, state, ended = 0, (tuple(flying.moved), states), COMPLETED
         while done <= last and ended == COMPLETED:
@@ -163,7 +163,7 @@ def _by_steps(flight: Flight, look: Look, flying: Any) -> _Ready:
     stall, frame = flying.stall, flying.frame
     record = struct.Struct(f"{len(readers) + 1}d")
 
-    def fly(compiled: Callable[..., Any], held: Any, rows: _Rows, watched: bool) -> _Progress:
+    def fly(compiled: Callable[..., Any], held: Any, rows: _Arrays, watched: bool) -> _Progress:
         values, known = bytearray(record.size), _known(flight)
         read, before = np.frombuffer(values), flying.heading()
         for k in range(last + 1):
@@ -202,7 +202,7 @@ def _flown(
     target = _target(flight.target, period, last)
     seen, estimates = _seen(flight, target)
     table, told = (np.empty((last + 1, n)) for n in (len(COLUMNS), len(compiled.told)))
-    rows = _Rows(table, target, seen, Instruments(flight).turns(last + 1), told)
+    rows = _Arrays(table, target, seen, Instruments(flight).turns(last + 1), told)
     done, outcome, reason = 0, Outcome.COMPLETED, ""
 
     def log_so_far() -> FlightLog:
