@@ -62,7 +62,7 @@ class Paired(NamedTuple):
     factors: Sequence[float]  # of each cell: how many times the flights other seeds need
 
 
-class Found(NamedTuple):
+class Findings(NamedTuple):
     """What the flights say."""
 
     plant: str
@@ -74,7 +74,7 @@ class Found(NamedTuple):
     lowest: str  # the cheapest plant
 
 
-def found(flights: pd.DataFrame) -> Found:
+def found(flights: pd.DataFrame) -> Findings:
     """What cheaper plants save in this run. Raises `StudyError` and `CompareError`."""
     *cheap, plant = map(str, ordered(flights["plant"]))
     own = sorted(set(flights["seed"][flights["plant"] == plant]))
@@ -95,7 +95,7 @@ def found(flights: pd.DataFrame) -> Found:
             if len(parts) == len(groups):
                 of, costs = zip(*parts, strict=True)
                 savings.append(Saving(*key, control, of, costs, whole.plain.mean))
-    return Found(plant, len(own), len(groups), len(rest), savings, list(_paired(flights, cheap[0], plant)), cheap[0])
+    return Findings(plant, len(own), len(groups), len(rest), savings, list(_paired(flights, cheap[0], plant)), cheap[0])
 
 
 def _told(
@@ -128,7 +128,7 @@ def _paired(flights: pd.DataFrame, low: str, high: str) -> Iterator[Paired]:
             yield Paired(metric, factors)
 
 
-def page(of: Found, command: str) -> str:
+def page(of: Findings, command: str) -> str:
     """The page."""
     best: dict[tuple[str, str], Saving] = {}
     for saving in of.savings:
