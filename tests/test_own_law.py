@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import os
 import sqlite3
 import time
@@ -324,7 +325,9 @@ import time
              "--set", "duration_s=0.5", "--set", "plant=kinematic", "--set")  # fmt: skip
     slow = invoke(*words, "law.standoff_m=180")
     assert slow.exit_code == 0
-    assert "warning: the law takes 2." in slow.output
+    said = re.search(r"warning: the law takes ([\d.]+) ms", slow.output)
+    assert said
+    assert float(said[1]) > 2.0  # more on a busy machine
     hangs = invoke(*words, "law.standoff_m=190")
     assert hangs.exit_code == 1
     assert "outcome: timeout: the law gave no answer in 0.4 s" in hangs.output
