@@ -225,6 +225,12 @@ def test_what_moves_late_or_with_play_is_waited_for_in_the_trim(model: str, beca
     assert float(left.partition(" ")[0]) < 5e-4, because
 
 
+def test_an_aircraft_whose_rudder_does_nothing_is_trimmed_with_sideslip(tmp_path: Path) -> None:
+    said = found_up_to("trim", "wrightFlyer1903", tmp_path)
+    assert re.search(r", rudder 0 rad/s\^2|, rudder \S+e-\d+ rad/s\^2", said["controls"])
+    assert ", rudder 0.00, sideslip -0.6 deg, " in said["trim"]
+
+
 def test_an_aircraft_turns_no_steeper_than_its_rudder_holds_and_then_flies(tmp_path: Path) -> None:
     said = found_up_to("90 deg", "Camel", tmp_path)
     assert "turns of 20 deg, for which aileron and rudder suffice" in said["design"]

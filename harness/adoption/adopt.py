@@ -255,8 +255,8 @@ def _controls(a: Adoption) -> Found:
         name = getattr(a.controls, surface)
         effect = _effect(tunnel, name, axis)
         if effect < 0.01 and surface not in (a.wish.controls or {}):
-            known = _commands(a)
-            effects = {other: _effect(tunnel, other, axis) for other in known}
+            taken = set(_names(_table(a.controls)))
+            effects = {other: _effect(tunnel, other, axis) for other in _commands(a) if other not in taken}
             best = max(effects, key=lambda other: effects[other], default=name)
             if effects.get(best, 0.0) > max(0.01, effect):
                 name, effect = best, effects[best]
@@ -304,9 +304,10 @@ def _trim(a: Adoption) -> Found:
             left, reason, tunnel = math.inf, str(error), _tunnel(a)
         if not reason:
             s = tunnel.setting
+            sideways = f", sideslip {math.degrees(s.sideslip):.1f} deg" if s.sideslip else ""
             return replace(a, start=tunnel.start, setting=s, speeds=speeds[i:]), (
                 f"{speed:.1f} m/s, pitch {math.degrees(s.pitch):.1f} deg, bank {math.degrees(s.bank):.2f} deg, "
-                f"elevator {s.elevator:.2f}, aileron {s.aileron:.2f}, rudder {s.rudder:.2f}, "
+                f"elevator {s.elevator:.2f}, aileron {s.aileron:.2f}, rudder {s.rudder:.2f}{sideways}, "
                 f"throttle {s.throttle:.2f}; {left:.1e} m/s^2 or rad/s^2 is left"
             )
         if not why or left < best:
@@ -327,7 +328,7 @@ def _trimmed(tunnel: WindTunnel) -> tuple[float, str]:
         throttle = float(np.clip(np.interp(0.0, pushes, _THROTTLES), 0.05, 0.95))
         tunnel.setting = tunnel.setting._replace(throttle=throttle)
     tunnel.solve(("pitch", "elevator", "throttle"), (0, 2, 4), 8, 2e-3)
-    tunnel.solve(("bank", "aileron", "rudder"), (1, 3, 5), 8, 2e-3)
+    tunnel.level()
     left = tunnel.trim()
     if not left < STEADY:
         rest = tunnel.at()

@@ -15,6 +15,7 @@ Eigenvalues = NDArray[np.complex128]
 
 COMMANDS = ("elevator", "aileron", "rudder", "throttle")
 _U, _V, _W, _P, _Q, _R = range(6)
+_LITTLE = 1e-3  # rad/s^2 of the whole travel: nothing
 _ANGLE, _RATE, _SPEED, _COMMAND = math.radians(0.5), math.radians(1.0), 0.01, 0.05
 
 
@@ -28,9 +29,9 @@ class Surface(NamedTuple):
 
     @property
     def is_uneven(self) -> bool:
-        """Whether something stands between command and surface: what a command does depends on its size."""
+        """Whether something stands between command and surface: the effect, if any, depends on the command's size."""
         sizes = [abs(effect) for effect in self.growing]
-        return max(sizes) > 2.0 * min(sizes)
+        return max(sizes) > max(2.0 * min(sizes), _LITTLE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,6 +33,7 @@ _CLEAN = ("gear/gear-cmd-norm", "gear/gear-pos-norm", "fcs/flap-cmd-norm", "fcs/
 )  # fmt: skip
 STEADY = 2e-3  # m/s^2 and rad/s^2: what is left of the accelerations in a trim
 _STARTER = 5.0  # s
+_NO_RUDDER = 0.01  # rad/s^2 of its whole travel
 _ASIDE, _ASIDE_FOR = 0.2, 0.3  # of the commands, and s
 
 
@@ -62,12 +63,15 @@ class TrimPoint(NamedTuple):
     bank: float = 0.0
     aileron: float = 0.0
     rudder: float = 0.0
+    sideslip: float = 0.0  # rad, beside zero only where the rudder does nothing
 
 
-_RANGE = TrimPoint(pitch=0.5, elevator=1.0, throttle=1.0, bank=0.35, aileron=1.0, rudder=1.0)
-_LEAST = TrimPoint(pitch=-0.35, elevator=-1.0, throttle=0.0, bank=-0.35, aileron=-1.0, rudder=-1.0)
-_NUDGE = TrimPoint(pitch=0.01, elevator=0.03, throttle=0.05, bank=0.01, aileron=0.03, rudder=0.03)
-_FARTHEST = TrimPoint(pitch=0.1, elevator=0.4, throttle=0.4, bank=0.1, aileron=0.4, rudder=0.4)  # of one step
+_RANGE = TrimPoint(pitch=0.5, elevator=1.0, throttle=1.0, bank=0.35, aileron=1.0, rudder=1.0, sideslip=0.1)
+_LEAST = TrimPoint(pitch=-0.35, elevator=-1.0, throttle=0.0, bank=-0.35, aileron=-1.0, rudder=-1.0, sideslip=-0.1)
+_NUDGE = TrimPoint(pitch=0.01, elevator=0.03, throttle=0.05, bank=0.01, aileron=0.03, rudder=0.03, sideslip=0.01)
+_FARTHEST = TrimPoint(
+    pitch=0.1, elevator=0.4, throttle=0.4, bank=0.1, aileron=0.4, rudder=0.4, sideslip=0.05
+)  # of one step
 
 
 class NotFiniteError(ValueError):
@@ -108,7 +112,7 @@ class WindTunnel:
         place(fdm, replace(self.start, airspeed=self.start.airspeed + faster), self.wind)
         fdm["ic/phi-rad"] = self.setting.bank
         fdm["ic/theta-rad"] = self.setting.pitch
-        fdm["ic/psi-true-rad"] = self.start.heading - sideslip
+        fdm["ic/psi-true-rad"] = self.start.heading - self.setting.sideslip - sideslip
         for axis, rate in zip("pqr", rates, strict=True):
             fdm[f"ic/{axis}-rad_sec"] = fdm[f"ic/{axis}-rad_sec"] * (axis == "q") + rate
         for name in _CLEAN:
@@ -245,6 +249,15 @@ class WindTunnel:
         with self.changed(**{name: nudge}):
             return (self.approached()[list(rows)] - now) / nudge
 
+    def level(self) -> Array:
+        """Solves for flight that goes straight: with the rudder, or with sideslip where the rudder does nothing."""
+        return self.solve(("bank", "aileron", self._yaws()), (1, 3, 5), 8, 2e-3)
+
     def trim(self) -> float:
         """Finds steady level flight from a setting near it; returns the largest acceleration that is left."""
-        return float(np.abs(self.solve(TrimPoint._fields, range(6))).max())
+        unknowns = ("pitch", "elevator", "throttle", "bank", "aileron", self._yaws())
+        return float(np.abs(self.solve(unknowns, range(6))).max())
+
+    def _yaws(self) -> str:
+        slope = float(self._slope("rudder", self.approached()[[5]], [5])[0])
+        return "rudder" if abs(slope) > _NO_RUDDER else "sideslip"
