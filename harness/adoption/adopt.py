@@ -242,6 +242,7 @@ def _held_back(tunnel: WindTunnel) -> Iterator[str]:
         limiter, power = (f"propulsion/engine[{i}]/{name}" for name in ("ielu_intervent", "power-hp"))
         if not unknown(fdm, [limiter, power]) and fdm[limiter]:
             yield f"the torque limiter of engine {i} holds it at {fdm[power]:.3g} hp"
+            break
     across = POUND * math.hypot(fdm["forces/fby-prop-lbs"], fdm["forces/fbz-prop-lbs"])
     if across > 10.0 * abs(tunnel.thrust):
         yield f"the engines push across the flight, by {across:.3g} N"
