@@ -104,6 +104,8 @@ def _lines(results: list[Tried], flown: list[Tried], trimmed: list[Tried], power
     yield ""
     yield "Each flew a change of course by 90° and two and a half laps with the paper's law, its gains scaled, in still"
     yield f"air and in wind of 0.3 of its airspeed. {inside} of the {len(flown)} turn within 5 % of the commanded rate."
+    far = [each.name for each in flown if not each.numbers["flown"]["circle_in_wind"]["error"] < 0.02]
+    yield f"In still air all keep the circle to 2 % of its radius; in wind {', '.join(far) or 'none'} does not."
     yield ""
     yield "- *Bank loop* and *damping*: its bandwidth and the least damping with it, by design."
     yield "- *Overshoot*, *rate in turn*, *altitude*: of the change of course; rate over the command one lag before."
