@@ -69,7 +69,7 @@ laws: install  ## fly every law in every air (ten minutes on two processors): do
 	$(BIN)/harness run experiments/laws.toml --out out/laws --log none
 	$(BIN)/python -m harness.studies.which_law out/laws
 
-adopt-all: install  ## adopt every model that comes with JSBSim: docs/answers/adopted_models.md (ten minutes)
+adopt-all: install  ## adopt every model that comes with JSBSim: docs/answers/adopted_models.md (a quarter of an hour)
 	$(BIN)/python -m harness.studies.adopted_models
 
 adopted: install  ## the law on three adopted aircraft and our own: docs/answers/adopted_law.md, design_rule.md (three minutes)
