@@ -101,6 +101,11 @@ def _row(cells: Iterable[str]) -> str:
     return "| " + " | ".join(re.sub(r"(?<!\\)\|", r"\|", cell) for cell in cells) + " |"
 
 
+def counted(count: int, noun: str) -> str:
+    """`1 flight`, `2 flights`."""
+    return f"{count} {noun}{'s' if count != 1 else ''}"
+
+
 def number(value: float | bool | None, scale: float = 1.0) -> str:
     """`scale` times the value with three significant digits; a dash for none, and yes or no for a truth value."""
     if value is None:

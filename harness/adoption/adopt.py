@@ -38,6 +38,7 @@ from harness.plants.model import (
 from harness.plants.plant import End, PlantError
 from harness.plants.turn import GRAVITY
 from harness.plants.wind_tunnel import POUND, STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
+from harness.tables import counted
 
 SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0, 2.8)  # times that of the lift coefficient below
 LIFT_COEFFICIENT = 0.5
@@ -165,7 +166,7 @@ def _load(a: Adoption) -> Found:
         chord=FT * fdm["metrics/cbarw-ft"],
     )  # fmt: skip
     made = f"{len(invented)} properties invented, {len(told)} as in FlightGear"
-    return a, f"{made}{filled}, {mass:.0f} kg, wing {area:.3g} m^2, {engines} engines"
+    return a, f"{made}{filled}, {mass:.0f} kg, wing {area:.3g} m^2, {counted(engines, 'engine')}"
 
 
 def _seconds_of_a_step(tunnel: WindTunnel) -> float:

@@ -13,6 +13,7 @@ import click
 
 from harness.cli._input import BadInput
 from harness.cli._progress import busy, duration, of_run
+from harness.tables import counted
 
 if TYPE_CHECKING:
     from harness.runs.matrix import Matrix
@@ -210,11 +211,6 @@ def print_endings(out: Path) -> None:
     endings = Counter(zip(early["outcome"], early["reason"], strict=True))
     for (outcome, reason), count in endings.most_common(_MOST_REASONS):
         click.echo(f"{count} x {outcome}: {reason}")
-
-
-def counted(number: int, noun: str) -> str:
-    """`1 flight`, `2 flights`."""
-    return f"{number} {noun}{'s' if number != 1 else ''}"
 
 
 def _size(size: float) -> str:

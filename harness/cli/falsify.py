@@ -85,7 +85,6 @@ def falsify(
 
     from harness.cli._input import BadInput
     from harness.cli._matrix import (
-        counted,
         engine_of,
         flown_out,
         many_flights,
@@ -103,6 +102,7 @@ def falsify(
     from harness.search.files import write_counterexample, write_probes
     from harness.search.space import Space
     from harness.settings import read_settings
+    from harness.tables import counted
 
     workers = processes(workers, flight_timeout, dask)
     try:
@@ -153,8 +153,7 @@ def _print_found(search: Falsification, counterexample: Path | None) -> None:
     """The worst trials, the counter-example or that there is none, and what the uniform trials say."""
     from collections import Counter
 
-    from harness.cli._matrix import counted
-    from harness.tables import table
+    from harness.tables import counted, table
 
     keys = [dimension.key for dimension in search.space.dimensions]
     name = search.requirement.name

@@ -135,7 +135,7 @@ def map_(
 
 def _print_search(found: Map) -> None:
     """What is mapped, how finely, and by how many flights at most."""
-    from harness.cli._matrix import counted
+    from harness.tables import counted
 
     border = found.panels[0].border
     click.echo(f"a map of {found.question.text} over")
@@ -150,8 +150,7 @@ def _print_search(found: Map) -> None:
 
 def _print_found(found: Map) -> None:
     """The share of each answer in each panel, and the flights that it took; what is not located or not flown."""
-    from harness.cli._matrix import counted
-    from harness.tables import table
+    from harness.tables import counted, table
 
     rows = []
     for panel in found.panels:

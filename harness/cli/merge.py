@@ -21,11 +21,11 @@ def merge(runs: tuple[Path, ...], out: Path) -> None:
     Example:
       harness merge out/wind_1 out/wind_2 --out out/wind
     """
-    from harness.cli._matrix import counted
     from harness.cli._progress import busy
     from harness.runs.merge import merge as merged
     from harness.runs.merge import told
     from harness.runs.results import export
+    from harness.tables import counted
 
     with busy("merging the runs"):
         one = merged(runs, out)

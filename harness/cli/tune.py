@@ -147,8 +147,8 @@ def _print_search(search: Tuning) -> None:
     """What is searched, and what is asked; a warning where the margin to the limit cycle is unknown."""
     from collections import Counter
 
-    from harness.cli._matrix import counted
     from harness.limit_cycle.predicted import MARGIN, why_unknown
+    from harness.tables import counted
 
     click.echo("every trial flies these; searched:")
     for dimension in search.space.dimensions:
@@ -163,8 +163,7 @@ def _print_search(search: Tuning) -> None:
 
 def _print_found(search: Tuning, files: Sequence[Path]) -> None:
     """The best settings, what they reach, what refused the others, and what keeps the best from more."""
-    from harness.cli._matrix import counted
-    from harness.tables import table
+    from harness.tables import counted, table
 
     refusals = "; ".join(
         f"{what} refused {count}{', before they were flown' if before else ''}"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from harness.log.metric import METRICS, YES_OR_NO
-from harness.tables import number, table
+from harness.tables import counted, number, table
 from harness.verdict import flown, moved
 from harness.verdict.comparison import Comparison, Scorecard
 from harness.verdict.conditions import Conclusion
@@ -262,11 +262,6 @@ def _options(card: Scorecard, cell: Mapping[str, object]) -> Iterator[str]:
 
 
 # Numbers
-
-
-def counted(count: int, noun: str) -> str:
-    """So many of a noun."""
-    return f"{count} {noun}{'s' if count != 1 else ''}"
 
 
 def plain(value: float) -> str:

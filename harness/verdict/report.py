@@ -16,8 +16,8 @@ from harness.log.figure import paint
 from harness.log.metric import METRICS
 from harness.settings.columns import DIRECTORY
 from harness.settings.written import written
+from harness.tables import counted, number
 from harness.tables import markdown as markdown_table
-from harness.tables import number
 from harness.template import template
 from harness.verdict import answer, curve, figures, flown, grid, moved
 from harness.verdict.comparison import Comparison, Scorecard
@@ -161,7 +161,7 @@ def _ladders(comparison: Comparison) -> Iterator[Drawing]:
         where = answer.place(first.at)
         yield Drawing(
             draw(partial(figures.waterfall, ladders=cell), height=2.6),
-            f"{first.aircraft}{', ' if where else ''}{where}, undisturbed, {answer.counted(first.seeds, 'seed')}: what "
+            f"{first.aircraft}{', ' if where else ''}{where}, undisturbed, {counted(first.seeds, 'seed')}: what "
             "each rung adds to the same flights.",
         )
 

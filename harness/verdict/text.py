@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
+from harness.tables import counted
 from harness.verdict import flown, grid, moved
-from harness.verdict.answer import answers, counted, missing_flights, opening, scorecard
+from harness.verdict.answer import answers, missing_flights, opening, scorecard
 from harness.verdict.comparison import Comparison, Unpaired
 from harness.verdict.pairs import CompareError, shown
 from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
