@@ -9,7 +9,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,12 +41,18 @@ def folder(name: str) -> Path:
 
     Of a recorded flight's aircraft it is the file.
     """
-    if is_recorded(name):
-        return Path(name).resolve()
-    for candidate in (FOLDER / name, Path(name)):
-        if (candidate / "airframe.toml").is_file() and model(candidate).is_file():
-            return candidate.resolve()
+    if name in _shipped():
+        return _shipped()[name]
+    path = Path(name)
+    if is_recorded(name) or ((path / "airframe.toml").is_file() and model(path).is_file()):
+        return path.resolve()
     raise FileNotFoundError(f"no airframe {name!r}: needs airframe.toml and a JSBSim model named as its folder")
+
+
+@cache  # every flight asks
+def _shipped() -> dict[str, Path]:
+    """The folders of the airframes that are shipped with the harness, by name."""
+    return {name: (FOLDER / name).resolve() for name in names()}
 
 
 def is_folder(name: str | Path) -> bool:

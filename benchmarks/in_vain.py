@@ -92,6 +92,11 @@ def _filtered(inverse: Callable[[Array], Array] | None) -> list[Estimate]:
     return found
 
 
+def update(inverse: Callable[[Array], Array] | None, repeats: int) -> float:
+    """What an update of such a filter takes, µs."""
+    return least(partial(_filtered, inverse), 1, repeats) / _UPDATES
+
+
 def of_the_filter(repeats: int) -> str:
     """Filters of our own beside filterpy's."""
     kinds: dict[str, Callable[[Array], Array]] = {
@@ -100,12 +105,12 @@ def of_the_filter(repeats: int) -> str:
         "a closed form": _closed_form,
     }
     usual = _filtered(None)
-    took = least(partial(_filtered, None), 1, repeats) / _UPDATES
+    took = update(None, repeats)
     told = []
     for name, inverse in kinds.items():
         moved = sum(a != b for a, b in zip(usual, _filtered(inverse), strict=True))
         moves = f"moves {moved} of {_UPDATES} estimates in their last bits" if moved else "moves no bit"
-        told.append(f"{least(partial(_filtered, inverse), 1, repeats) / _UPDATES:.1f} with {name}, which {moves}")
+        told.append(f"{update(inverse, repeats):.1f} with {name}, which {moves}")
     return (
         f"**A filter of our own in place of filterpy's**, with its arithmetic and without its copies: an update takes "
         f"{took:.1f} µs, and {'; '.join(told)}."

@@ -84,7 +84,7 @@ def test_recordings_are_timed_until_they_are_drawn(capsys: pytest.CaptureFixture
 
 
 def test_compiled_flights_are_timed_beside_those_of_python(capsys: pytest.CaptureFixture[str]) -> None:
-    compiled.main(pairs=1, flights=24)
+    compiled.main(pairs=1, seeds=2)
     *table, matrix, first = lines(capsys)
     for what in ("| a flight |", "| a flight with its metrics |"):
         (line,) = (line for line in table if line.startswith(what))
