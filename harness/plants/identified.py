@@ -111,8 +111,13 @@ def is_stale(airframe: Path) -> bool:
     """Whether the airframe's model or its inner loop has changed since it was identified. OSError without the file."""
     if aircraft.is_recorded(airframe):
         return False
-    text = aircraft.identified(airframe).read_text(encoding="utf-8")
-    return tables_of(text).get("model") != model_digest(airframe)
+    return _model(aircraft.identified(airframe).read_text(encoding="utf-8")) != model_digest(airframe)
+
+
+@lru_cache(maxsize=16)
+def _model(text: str) -> object:
+    """The hash of the model that was identified, from the text of a file."""
+    return tables_of(text).get("model")
 
 
 def model_digest(airframe: Path) -> str:
