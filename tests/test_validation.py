@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import aircraft
-from harness.plants import sixdof
-from harness.plants.sixdof import REPLAYED, Moment
+from harness.plants.replay import REPLAYED, Moment, replay
 from harness.recorded.frames import to_earth
 from harness.recorded.read import read_log
 from harness.recorded.recorded_flight import Array, Basis, Channel, RecordedFlight
@@ -31,7 +30,7 @@ def flown_by_the_model(hidden: Adjusted) -> RecordedFlight:
     for k in (0, 1):
         late[:, k] = np.interp(time - hidden.delay, time, commands[:, k]) + hidden[k]
     start = Moment(ALTITUDE, 0.1, 0.08, 1.0, 3.0 + 18.0 * np.cos(1.0), 18.0 * np.sin(1.0), 0.0, 0.0, 0.0, 0.0)
-    flown = dict(zip(REPLAYED, sixdof.replay(X8, STEP, start, late).T, strict=True))
+    flown = dict(zip(REPLAYED, replay(X8, STEP, start, late).T, strict=True))
     air = {"wind_north": commands[:, 4], "wind_east": commands[:, 5], "wind_down": commands[:, 6]}
     velocity = velocity_of(flown, air)
     surfaces = {"aileron": commands[:, 0], "elevator": commands[:, 1], "throttle": commands[:, 3]}

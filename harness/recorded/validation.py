@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.plants import sixdof
-from harness.plants.sixdof import REPLAYED, SURFACES, Moment
+from harness.plants.replay import REPLAYED, SURFACES, Moment, replay
 from harness.recorded.recorded_flight import Array, LogError, RecordedFlight
 
 JUDGED = ("roll_rate", "pitch_rate", "yaw_rate", "bank", "pitch", "yaw")
@@ -70,7 +69,7 @@ def validated(airframe: Path, flights: Sequence[RecordedFlight]) -> Validation:
     notes = tuple(note for flight in flights for note in _checked(airframe, flight))
     found = _fitted(airframe, flights)
     longest = max(h for h in HORIZONS if any(list(_starts(flight, h, h)) for flight in flights))
-    curves = [replay for flight in flights for replay in _replays(airframe, flight, longest, longest, found)]
+    curves = [one for flight in flights for one in _replays(airframe, flight, longest, longest, found)]
     return Validation(
         airframe,
         tuple(flights),
@@ -123,7 +122,7 @@ def _replays(
         names = Moment._fields[1:]
         at_start = flight.table(names, time[:1])[0]
         commands = _commands(flight, time, adjusted)
-        simulated = sixdof.replay(airframe, STEP, Moment(ALTITUDE, *at_start.tolist()), commands)
+        simulated = replay(airframe, STEP, Moment(ALTITUDE, *at_start.tolist()), commands)
         simulated[:, 2] = np.unwrap(simulated[:, 2])
         recorded = np.column_stack(
             [flight[name].at(time) if name in flight else np.full(len(time), np.nan) for name in REPLAYED]
@@ -133,7 +132,7 @@ def _replays(
 
 
 def _commands(flight: RecordedFlight, time: Array, adjusted: Adjusted) -> Array:
-    """The rows of `sixdof.replay`; a command stays what it was before the log's first and after its last row."""
+    """The rows of `replay`; a command stays what it was before the log's first and after its last row."""
     columns = []
     for name in (*SURFACES, "wind_north", "wind_east", "wind_down"):
         if name not in flight:
@@ -152,12 +151,12 @@ def _fitted(airframe: Path, flights: Sequence[RecordedFlight]) -> Adjusted:
 
     def residuals(x: Array) -> Array:
         replays = [
-            replay
+            one
             for flight in flights
-            for replay in _replays(airframe, flight, HORIZONS[0], _FIT_APART, Adjusted(*x.tolist()))
+            for one in _replays(airframe, flight, HORIZONS[0], _FIT_APART, Adjusted(*x.tolist()))
         ]
         columns = [REPLAYED.index(name) for name in RATES]
-        return np.concatenate([_errors(replay)[::5, columns].ravel() for replay in replays])
+        return np.concatenate([_errors(one)[::5, columns].ravel() for one in replays])
 
     most = [LARGEST_OFFSET, LARGEST_OFFSET, LONGEST_DELAY]
     found = least_squares(

@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from harness.drawing import COLOURS, INK
-from harness.plants.sixdof import REPLAYED
+from harness.plants.replay import REPLAYED
 from harness.recorded.contents import SHOWN
 from harness.recorded.recorded_flight import QUANTITIES
 from harness.recorded.validation import APART, HORIZONS, JUDGED, ReplayFit, Validation
