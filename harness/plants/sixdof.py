@@ -4,9 +4,9 @@ In this order: trimming a model, engaging its inner loop, flying it.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -175,20 +175,19 @@ class SixDof:
         fdm = load(self.airframe, self.step, self.errors)
         if adopted := aircraft.adopted(self.airframe):
             self._engage_adopted(fdm, adopted, start, air)
-            return SixDofFlying(fdm, self.step, start, air, limits.stall, _gusts(fdm, air) if len(air.gusts) else None)
+            return SixDofFlying(fdm, self.step, start, air, limits.stall, _stepper(fdm, air))
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:
             allowed = f"{self.airframe.name} flies from {limits.slowest:g} to {limits.fastest:g} m/s"
             raise PlantError("start.airspeed", f"{error}; {allowed}") from None
         engage(fdm, trimmed, start, self.rate_trim)
-        gusts = _gusts(fdm, air) if len(air.gusts) else None
-        if gusts:  # the first gust is there before the surfaces answer it
-            next(gusts)
+        stepper = _stepper(fdm, air)
+        if len(air.gusts):  # the first gust is there before the surfaces answer it
             _connect(fdm, False)
-            fdm.run_ic()
+            stepper(1, fdm.run_ic)
             _connect(fdm, True)
-        return SixDofFlying(fdm, self.step, start, air, limits.stall, gusts)
+        return SixDofFlying(fdm, self.step, start, air, limits.stall, stepper)
 
     def _engage_adopted(self, fdm: Fdm, adopted: Mapping[str, Any], start: Start, air: Air) -> None:
         """Trims an adopted model in the wind tunnel, hands it to its inner loop, and lets it fly."""
@@ -211,12 +210,21 @@ class SixDof:
         tunnel.release()
 
 
-def _gusts(fdm: Fdm, air: Air) -> Iterator[None]:
-    """Puts the next gust and rotation of the air into JSBSim; `next` of it is to be called before each `run()`.
+Stepper = Callable[[int, Callable[[], object]], None]
+"""Makes so many steps, each by a call such as `fdm.run`, before which JSBSim gets the air at the end of the step."""
 
-    The values are those at the end of the step that `run()` then makes. JSBSim's own steady wind is the
-    horizontal wind at the start, in which the aircraft was trimmed: gusts are the difference to it.
-    """
+
+def _stepper(fdm: Fdm, air: Air) -> Stepper:
+    return _in_gusts(fdm, air) if len(air.gusts) else _in_steady_air
+
+
+def _in_steady_air(steps: int, run: Callable[[], object]) -> None:
+    for _ in range(steps):
+        run()
+
+
+def _in_gusts(fdm: Fdm, air: Air) -> Stepper:
+    """JSBSim's steady wind is the horizontal wind in which the aircraft was trimmed; gusts are the difference to it."""
     set_x, set_y, set_z, roll, pitch, yaw = (
         node(fdm, name).set_double_value
         for name in (
@@ -231,19 +239,24 @@ def _gusts(fdm: Fdm, air: Air) -> Iterator[None]:
     blocks = (
         table[k : k + 1000].tolist() for k in range(0, len(table), 1000)
     )  # in blocks: as lists, the whole table would take four times its memory
+    rows = chain.from_iterable(blocks)
     sin, cos, is_sheared = math.sin, math.cos, bool(shear_x or shear_y)
-    for W_x, W_y, W_z, p, q, r_x, r_y in chain.from_iterable(blocks):
-        if is_sheared:
-            above = height() - level
-            W_x, W_y = W_x + shear_x * above, W_y + shear_y * above
-        psi = heading()
-        set_x(W_x)
-        set_y(W_y)
-        set_z(W_z)
-        roll(p)
-        pitch(q)
-        yaw(r_y * cos(psi) - r_x * sin(psi))
-        yield
+
+    def step(steps: int, run: Callable[[], object]) -> None:
+        for W_x, W_y, W_z, p, q, r_x, r_y in islice(rows, steps):
+            if is_sheared:
+                above = height() - level
+                W_x, W_y = W_x + shear_x * above, W_y + shear_y * above
+            psi = heading()
+            set_x(W_x)
+            set_y(W_y)
+            set_z(W_z)
+            roll(p)
+            pitch(q)
+            yaw(r_y * cos(psi) - r_x * sin(psi))
+            run()
+
+    return step
 
 
 Frame = tuple[float, float, float, float, float, float, float]
@@ -278,14 +291,12 @@ def is_flying(state: State, stall: float) -> bool:
 class SixDofFlying:
     """The aircraft in flight, in JSBSim."""
 
-    def __init__(
-        self, fdm: Fdm, step: float, start: Start, air: Air, stall: float, gusts: Iterator[None] | None
-    ) -> None:
+    def __init__(self, fdm: Fdm, step: float, start: Start, air: Air, stall: float, stepper: Stepper) -> None:
         self.fdm, self.stall = fdm, stall
         self.readers = [node(fdm, name).get_double_value for name in _READ]
         self.frame: Frame = (*start.position, *air.steady, *air.horizontal(0), step)
         self._run: Callable[[], bool] = fdm.run
-        self._gusts = gusts
+        self._step = stepper
         self._velocity_north, self._velocity_east = self.readers[2:4]
         self._command = node(fdm, "inner-loop/command/heading-rate-rad_s").set_double_value
         self.stalled_for = 0.0
@@ -301,18 +312,9 @@ class SixDofFlying:
     def fly(self, heading_rate: float, period: float) -> float:
         """Flies on, and gives the heading one step before the end, rad; what is then is not looked at."""
         self._command(heading_rate)
-        run, gusts, steps = self._run, self._gusts, round(period / self.frame[-1])
-        if gusts is None:
-            for _ in range(steps - 1):
-                run()
-            before = self.heading()
-        else:
-            for _ in range(steps - 1):
-                next(gusts)
-                run()
-            before = self.heading()
-            next(gusts)
-        run()
+        self._step(round(period / self.frame[-1]) - 1, self._run)
+        before = self.heading()
+        self._step(1, self._run)
         return before
 
     def heading(self) -> float:
