@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from harness.flight import Flight
 from harness.plants.plant import End, Outcome
 from harness.plants.state import State
 from harness.world.randomness import stream
-from harness.world.target import TargetState
+from harness.world.target import Target, TargetState
 
 NO_MEASUREMENT = Measurement(math.nan, math.nan)
 _AHEAD = 1000  # guidance steps
@@ -56,6 +57,22 @@ def heading_in(wind: tuple[float, float], velocity_north: float, velocity_east: 
     return math.atan2(velocity_east - W_y, velocity_north - W_x)
 
 
+class Sighting(NamedTuple):
+    """What decides the estimates of a flight: neither its plant nor its law. Fields as of `Flight`."""
+
+    estimator: Estimator
+    target: Target
+    seed: int
+    step: float
+    guidance_period: float
+    periods: int
+
+
+def sighting(flight: Flight) -> Sighting:
+    """That of this flight."""
+    return Sighting._make(getattr(flight, name) for name in Sighting._fields)
+
+
 class Estimation:
     """The sensor and the filter of one flight: the estimated target at each guidance step.
 
@@ -64,16 +81,15 @@ class Estimation:
     keep their noise.
     """
 
-    def __init__(self, flight: Flight, target: Callable[[float], TargetState]) -> None:
-        """`target` gives the true state at a time in s: measurements may fall between two guidance steps."""
+    def __init__(self, of: Sighting) -> None:
         self.rows: list[tuple[float, ...]] = []
-        self._target = target
-        self._measure, self._filter = sensor(flight.estimator, flight.seed), flight.estimator.start()
-        self._is_lost = losses(flight.estimator, flight.seed)
-        self._step, self._period = flight.step, flight.estimator.period
-        self._steps_per_guidance = round(flight.guidance_period / flight.step)
-        self._steps_per_measurement = round(flight.estimator.period / flight.step)
-        self._last = flight.periods
+        self._target = of.target.start()  # at any time: measurements may fall between two guidance steps
+        self._measure, self._filter = sensor(of.estimator, of.seed), of.estimator.start()
+        self._is_lost = losses(of.estimator, of.seed)
+        self._step, self._period = of.step, of.estimator.period
+        self._steps_per_guidance = round(of.guidance_period / of.step)
+        self._steps_per_measurement = round(of.estimator.period / of.step)
+        self._last = of.periods
         self._end: End | None = None  # how the filter ended, after the last of the rows
         self._measurements = 0  # due so far, with the lost ones; the next one has this number
 

@@ -11,7 +11,7 @@ from autopilot.guidance import Context, Guidance, Law, LawStep, Observation, Tel
 from harness.checks import problems
 from harness.feasibility import margins_in_flight
 from harness.flight import Flight, air_of, command_delay, context_of, plant_of
-from harness.knowledge import Estimation, Instruments, heading_in, perfect_estimator
+from harness.knowledge import Estimation, Instruments, heading_in, perfect_estimator, sighting
 from harness.log import COLUMNS, LOOP_COLUMNS, SEEN_COLUMNS, FlightLog
 from harness.plants.late import Late
 from harness.plants.plant import End, Outcome, Plant
@@ -40,7 +40,7 @@ def simulate(
     monitoring_range = flight.metrics.monitoring_range
 
     target = flight.target.start()
-    estimation = Estimation(flight, target) if flight.estimator.filters else None
+    estimation = Estimation(sighting(flight)) if flight.estimator.filters else None
     estimator = estimation.at if estimation else perfect_estimator(flight.estimator)
     known = context or context_of(flight)
     flying = (plant or plant_of(flight)).start(flight.start, air_of(flight))

@@ -16,7 +16,7 @@ from autopilot.laws import law
 from harness.checks import problems
 from harness.feasibility import warnings
 from harness.flight import MetricSettings, air_of, plant_of
-from harness.knowledge import Estimation, sensor
+from harness.knowledge import Estimation, sensor, sighting
 from harness.log import COLUMNS, FlightLog
 from harness.loop import command, observe, simulate
 from harness.plants.plant import Outcome
@@ -317,9 +317,8 @@ def test_the_target_is_lost_beyond_the_monitoring_range_of_the_truth(north: floa
 
 
 def test_what_falls_due_between_two_looks_is_measured_at_its_own_time() -> None:
-    one = EKF
-    at: Callable[[float], TargetState] = one.target.start()
-    each, only_last = Estimation(one, at), Estimation(one, at)
+    at: Callable[[float], TargetState] = EKF.target.start()
+    each, only_last = Estimation(sighting(EKF)), Estimation(sighting(EKF))
     assert [each.at(k, at(0.05 * k)) for k in range(38)][-1] == only_last.at(37, at(1.85))
 
 

@@ -5,6 +5,7 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from harness.compiled.loop import (
     moving,
 )
 from harness.flight import Flight, air_of, command_delay, context_of, plant_of
-from harness.knowledge import Estimation, Instruments, perfect_estimator
+from harness.knowledge import Estimation, Instruments, Sighting, perfect_estimator, sighting
 from harness.log import COLUMNS, FlightLog
 from harness.plants.ladder import PLANTS
 from harness.plants.level import InPieces, Level, MovingInPieces, States
@@ -35,6 +36,7 @@ from harness.plants.state import State
 from harness.toml_text import shortened
 from harness.world.air import Air
 from harness.world.target import Leg, Target, TargetState
+from harness.world.track import Track, load_track
 
 Array = NDArray[np.float64]
 _TRIED = 100.0  # s of the first flight of a kernel, which Python flies as well
@@ -199,8 +201,9 @@ def _flown(
 ) -> FlightLog:
     """The log of the flight. Raises `NotCompiledError` where it is left to Python."""
     period, last = flight.guidance_period, flight.periods
-    target = _target(flight.target, period, last)
-    seen, estimates = _seen(flight, target)
+    track = load_track(Path(flight.target.track)) if flight.target.track is not None else None
+    target = _target(flight.target, track, period, last)
+    seen, estimates = _seen(flight, track, target)
     table, told = (np.empty((last + 1, n)) for n in (len(COLUMNS), len(compiled.told)))
     rows = _Arrays(table, target, seen, Instruments(flight).turns(last + 1), told)
     done, outcome, reason = 0, Outcome.COMPLETED, ""
@@ -248,9 +251,9 @@ def _judge(function: Any, error: BaseException) -> None:
 
 
 @lru_cache(maxsize=8)
-def _target(target: Target, period: float, last: int) -> Array:
-    """The target at each row, as `TargetState`: (last + 1, 6)."""
-    if target.track is None and (target.speed or target.segments):
+def _target(target: Target, track: Track | None, period: float, last: int) -> Array:
+    """The target at each row, as `TargetState`: (last + 1, 6); `track` as its file is now."""
+    if track is None and (target.speed or target.segments):
         return _moving(target, period, last)
     at = target.start()
     return np.array([at(k * period) for k in range(last + 1)], dtype=np.float64)
@@ -274,18 +277,25 @@ def _moving(target: Target, period: float, last: int) -> Array:
     return rows
 
 
-def _seen(flight: Flight, target: Array) -> tuple[Array, Array | None]:
+def _seen(flight: Flight, track: Track | None, target: Array) -> tuple[Array, Array | None]:
     """The target as the law knows it at each row, and the rows of an `Estimation`."""
     if not flight.estimator.filters:
         truth = TargetState(*target.T)
         known = perfect_estimator(flight.estimator)(0, truth)
         return target if known is truth else np.column_stack(np.broadcast_arrays(*known)), None
-    estimation = Estimation(flight, flight.target.start())
+    return _estimated(sighting(flight), track)
+
+
+@lru_cache(maxsize=1)
+def _estimated(of: Sighting, track: Track | None) -> tuple[Array, Array]:
+    """The same with a filter; of flights that differ in plant or law alone it is made once."""
+    estimation = Estimation(of)
     try:
-        last = estimation.at(len(target) - 1, TargetState(0.0, 0.0, 0.0, 0.0))  # the truth is not used
+        last = estimation.at(of.periods, TargetState(0.0, 0.0, 0.0, 0.0))  # the truth is not used
     except End as end:
         raise NotCompiledError(str(end)) from None
-    rows, seen = np.array(estimation.rows), np.tile(np.array(last), (len(target), 1))
+    rows = np.array(estimation.rows)
+    seen = np.tile(np.array(last), (len(rows), 1))
     seen[:, :4] = rows[:, :4]  # what no filter estimates is the same throughout
     return seen, rows
 
