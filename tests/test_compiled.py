@@ -105,6 +105,31 @@ def test_flights_on_sixdof_by_compiled_steps_have_the_tables_of_python_however_t
     assert stalled
 
 
+def test_estimates_are_made_once_for_flights_of_all_laws_and_plants_and_anew_for_another_seed() -> None:
+    flight = replace(FLIGHT, duration=2.0, estimator=replace(FLIGHT.estimator, kind="ekf"), seed=12345)
+    before = engine._estimated.cache_info().misses
+    for plant in ("kinematic", "lagged"):
+        for name in ("nftsm", "orbit_field"):
+            one = replace(flight, plant=plant, law=law(name))
+            assert compiled(one).digest == loop.simulate(one).digest
+    assert engine._estimated.cache_info().misses == before + 1
+    other = replace(flight, seed=54321)
+    assert compiled(other).digest == loop.simulate(other).digest
+    assert engine._estimated.cache_info().misses == before + 2
+
+
+@pytest.mark.parametrize("kind", ["truth", "ekf"])
+def test_a_track_that_has_changed_on_the_disk_is_flown_as_it_is_now(tmp_path: Path, kind: str) -> None:
+    track, digests = tmp_path / "track.csv", set()
+    target, estimator = Target(track=str(track)), replace(FLIGHT.estimator, kind=kind)
+    flight = replace(FLIGHT, duration=2.0, target=target, estimator=estimator)
+    for north in (10.0, 30.0):
+        track.write_text(f"time_s,north_m,east_m\n0,0,0\n1,{north},0\n2,{north},5\n3,0,9\n")
+        digests.add(compiled(flight).digest)
+        assert compiled(flight).digest == loop.simulate(flight).digest
+    assert len(digests) == 2
+
+
 def test_a_flight_by_compiled_steps_is_watched_row_by_row() -> None:
     flight = replace(FLIGHT, plant="sixdof", duration=1.0)
     rows: list[tuple[float, int]] = []
