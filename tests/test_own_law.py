@@ -21,7 +21,7 @@ from harness.log.signals import at_limit
 from harness.plants.plant import Outcome
 from harness.runs.store import content
 from harness.settings import SettingsError, document, flight_from_document
-from harness.settings.laws import entries
+from harness.settings.law_source import entries
 from tests.builders import EXPERIMENTS, command, fly_matrix, invoke, write
 
 PLAIN = '''

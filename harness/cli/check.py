@@ -61,7 +61,8 @@ def _check_law(what: str) -> None:
     from harness.cli._input import BadInput
     from harness.doctor.own_law import classes, examined, flights
     from harness.settings import SettingsError
-    from harness.settings.laws import LawError, absolute, kind_of
+    from harness.settings.law_source import LawError
+    from harness.settings.laws import absolute, kind_of
     from harness.tables import table
 
     path, colon, name = what.rpartition(":") if not what.endswith(".py") else (what, "", "")

@@ -9,7 +9,8 @@ import click
 
 def _laws() -> Iterator[str]:
     from autopilot.laws import LAWS
-    from harness.settings.laws import LawError, entries, kind_of
+    from harness.settings.law_source import LawError, entries
+    from harness.settings.laws import kind_of
     from harness.tables import number, table
 
     for i, name in enumerate([*LAWS, *entries()]):

@@ -24,7 +24,7 @@ from harness.runs.parcels import Packed, Parcel, keep, unpacked
 from harness.runs.recordings import recording_path
 from harness.runs.wall_time import WallTime
 from harness.runs.workers import Done, Task, WorkerResult, WorkersError, fly_all, fly_task
-from harness.settings.laws import LawError
+from harness.settings.law_source import LawError
 
 SOURCE = "harness source"
 _PROCESSOR = "processor"

@@ -17,7 +17,8 @@ from autopilot.laws import law
 from harness.files import content_hash, read
 from harness.flight import Flight
 from harness.key import hashed
-from harness.settings.laws import FILES, kind_of, parameters, source_of
+from harness.settings.law_source import FILES
+from harness.settings.laws import kind_of, parameters, source_of
 
 Parcel = Mapping[str, bytes]  # the content of files, by their path below the folder of the parcel
 _SUFFIXES = (".toml", ".xml")  # of the files of an airframe

@@ -19,7 +19,8 @@ from harness.runs import apart
 from harness.runs.row import FlightResult, result_of
 from harness.runs.store import Stored, StoreError, content, examples, find, reading
 from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
-from harness.settings.laws import FILES, is_unchanged
+from harness.settings.law_source import FILES
+from harness.settings.laws import is_unchanged
 from harness.toml_text import shortened
 
 _LONGEST = 250  # bytes of a name, without its ending

@@ -12,7 +12,7 @@ from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.runs.store import JOURNAL, StoreError, last_run, reading, state
 from harness.settings.columns import by_column, is_setting
-from harness.settings.laws import FILES
+from harness.settings.law_source import FILES
 
 if TYPE_CHECKING:
     import pandas as pd

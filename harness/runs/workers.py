@@ -30,7 +30,7 @@ from harness.runs.own_time import OwnTime
 from harness.runs.recordings import record, wanted
 from harness.runs.row import FlightResult, failed_result, result_of, simulate_safely
 from harness.runs.wall_time import CHUNK, WallTime
-from harness.settings.laws import LawError
+from harness.settings.law_source import LawError
 from harness.spawn import SPAWN
 
 AHEAD = 2  # chunks sent out per worker: one is flown, one waits

@@ -24,7 +24,8 @@ from harness.settings.experiment import CUSTOM, Experiment, document_table, with
 from harness.settings.former_names import without_former_names
 from harness.settings.gains import by_rule
 from harness.settings.keys import file_key, put
-from harness.settings.laws import LawError, absolute, is_own, kind_of
+from harness.settings.law_source import LawError
+from harness.settings.laws import absolute, is_own, kind_of
 from harness.settings.mended import concerns, mended
 from harness.settings.mistake import Mistake, Place, Places, settings_error
 from harness.settings.speed import at_own_speed

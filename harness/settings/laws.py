@@ -4,56 +4,22 @@ A law of one's own is code. It is run where a user names it, never because a sto
 is run from the user's own file alone, and only while that has the content that the row was flown with.
 """
 
-import ast
 import copyreg
 import math
 import sys
-import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 from importlib import import_module
-from importlib.metadata import entry_points
-from inspect import isclass
 from pathlib import Path
-from types import MappingProxyType, ModuleType
-from typing import Any, Literal, NamedTuple, get_origin
+from types import ModuleType
+from typing import Any, Literal
 
 from autopilot.guidance import Law
 from autopilot.laws import LAWS, LawKind
-from harness.error import SettingsError, did_you_mean
-from harness.files import content_hash, read
-from harness.settings.table import Setting, schema_of
-
-ENTRY_POINTS = "standoff_harness.laws"  # the group by which a package names its laws
-FILES = "law/"  # begins what a version calls the files of a law of one's own
-FORMS = "FILE.py:CLASS or MODULE:CLASS"
-_MEMBERS = ("start", "command", "broken_conditions")  # besides the fields
-_FIELDS = ("standoff", "max_heading_rate")  # numbers that every result has
-_OTHERWISE = {"__name__", "TYPE_CHECKING"}  # in an `if`: what follows is not run when the file is imported
-_INSTALLED = ("site-packages", "dist-packages")
-
-
-class LawError(ValueError):
-    """A law that cannot be used; the message says why in one line."""
-
-
-class Source(NamedTuple):
-    """Where a law of one's own is written: found without running it."""
-
-    name: str  # as settings keep it: the path of a file is absolute
-    where: str  # the path of its file, or its module
-    class_name: str
-    main: Path
-    root: Path  # below which its files lie
-    files: Mapping[str, Path]  # its file and the local ones that it imports, by what a version calls them
-    hashes: Mapping[str, str]  # of their content
-    classes: frozenset[str]  # that they define
-
-    @property
-    def is_module(self) -> bool:
-        """Whether Python imports it as a module, once in a process; a file is run for each content that it has."""
-        return not self.where.endswith(".py")
+from harness.error import SettingsError
+from harness.files import content_hash
+from harness.settings.law_class import kind_in
+from harness.settings.law_source import FILES, LawError, Source, entries, find
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,8 +58,6 @@ class NotRun:
 _LOADED: dict[tuple[str, tuple[str, ...]], OwnLaw] = {}  # by name and content
 _LATEST: dict[str, OwnLaw] = {}  # by name
 _BY_CLASS: dict[type, OwnLaw] = {}
-_FOUND: dict[str, tuple[Source, list[tuple[int, int, int]]]] = {}  # by name, with the stamps of its files
-_YOUNG = 100_000_000  # ns
 
 
 def kind_of(name: str, *, run: bool) -> LawKind:
@@ -152,12 +116,6 @@ def absolute(name: str, folder: Path) -> str:
     return f"{(folder / Path(where).expanduser()).absolute()}:{class_name}" if colon and where.endswith(".py") else name
 
 
-@cache
-def entries() -> Mapping[str, str]:
-    """The laws of installed packages: MODULE:CLASS by name."""
-    return {entry.name: entry.value for entry in entry_points(group=ENTRY_POINTS) if entry.name not in LAWS}
-
-
 def is_unchanged(settings: Mapping[str, Any], content: Mapping[str, str]) -> None:
     """Loads the law of a stored row if its file is here and as the row was flown, by the hashes of its `content`.
 
@@ -179,135 +137,6 @@ def is_unchanged(settings: Mapping[str, Any], content: Mapping[str, str]) -> Non
         raise SettingsError([f"flight.law.name: {short(name)}: {error}"]) from None
 
 
-def find(name: str) -> Source:
-    """The source of a law of one's own, found and read without running it. Raises `LawError`.
-
-    It is read again when one of its files has another time or size; always while they are so young that a time tells
-    too little.
-    """
-    if name in _FOUND and _FOUND[name][1] == _stamps(_FOUND[name][0]):
-        return _FOUND[name][0]
-    source = _find(name)
-    stamps = _stamps(source)
-    if stamps and max(changed for changed, *_ in stamps) < time.time_ns() - _YOUNG:
-        _FOUND[name] = source, stamps
-    return source
-
-
-def _stamps(source: Source) -> list[tuple[int, int, int]]:
-    """Of each file when it changed, ns, its size and its number; empty when one is gone."""
-    try:
-        return [(of.st_mtime_ns, of.st_size, of.st_ino) for of in map(Path.stat, source.files.values())]
-    except OSError:
-        return []
-
-
-def _find(name: str) -> Source:
-    where, colon, class_name = entries().get(name, name).rpartition(":")
-    if not colon or not where or not class_name.isidentifier():
-        if name.endswith(".py"):
-            raise LawError(f"names a file and no class of it, must be {name}:CLASS")
-        known = ", ".join([*LAWS, *entries()])
-        raise LawError(f"must be one of {known}, or {FORMS}{did_you_mean(name, [*LAWS, *entries()])}")
-    if where.endswith(".py"):
-        main = Path(where)
-        if not main.is_file():
-            raise LawError(f"{main}: there is no such file")
-        root, package = main.parent, ""
-    else:
-        main, root, package = _module_file(where)
-    trees = _closure(main, root, package)
-    files = {_called(path, root): path for path in trees}
-    classes = frozenset(n.name for tree in trees.values() for n in tree.body if isinstance(n, ast.ClassDef))
-    try:
-        hashes = {label: content_hash(read(path)) for label, path in files.items()}
-    except OSError as error:
-        raise LawError(f"{error.filename}: {error.strerror}") from None
-    return Source(name, where, class_name, main, root, MappingProxyType(files), MappingProxyType(hashes), classes)
-
-
-def _called(path: Path, root: Path) -> str:
-    inside = path.is_relative_to(root)
-    return f"{FILES}{path.relative_to(root).as_posix() if inside else path.name}"
-
-
-def _module_file(module: str) -> tuple[Path, Path, str]:
-    """A module's file, the folder of its outermost package, and the name of that; nothing is imported."""
-    search: Sequence[str] | None = None
-    spec = None
-    words = module.split(".")
-    for i in range(len(words)):
-        name = ".".join(words[: i + 1])
-        finders = (finder for finder in sys.meta_path if hasattr(finder, "find_spec"))
-        spec = next((found for finder in finders if (found := finder.find_spec(name, search))), None)
-        search = spec.submodule_search_locations if spec else None
-        if spec is None or (search is None and i + 1 < len(words)):
-            raise LawError(
-                f"there is no module {name}: it must be installed, or its folder be in PYTHONPATH; "
-                f"a file is named as {words[-1]}.py:CLASS"
-            )
-    main = Path(spec.origin) if spec and spec.origin else Path()
-    if not main.is_file():
-        raise LawError(f"the module {module} is no file of Python")
-    depth = len(words) - 1 + (main.name == "__init__.py")
-    root = main.parents[depth]
-    alone = depth == 0 and not {*_INSTALLED} & {*root.parts}
-    return main, root, "" if alone else words[0]
-
-
-def _closure(main: Path, root: Path, package: str) -> dict[Path, ast.Module]:
-    """The file and all that it imports, directly or not, from `root`: of `package` alone if one is given."""
-    found: dict[Path, ast.Module] = {}
-    around = [folder / "__init__.py" for folder in main.parents if package and folder.is_relative_to(root / package)]
-    waiting = [main, *(path for path in around if path.is_file())]
-    while waiting:
-        path = waiting.pop()
-        if path in found:
-            continue
-        try:
-            found[path] = ast.parse(path.read_bytes(), str(path))
-        except OSError as error:
-            raise LawError(f"{path}: {error.strerror or error}") from None
-        except (SyntaxError, ValueError) as error:
-            raise LawError(f"{path}:{getattr(error, 'lineno', None) or 1}: is not valid Python: {error}") from None
-        waiting += _imported(found[path], path, root, package)
-    return found
-
-
-def _imported(tree: ast.Module, path: Path, root: Path, package: str) -> Iterator[Path]:
-    """The local files of each import in a file, wherever in it that stands."""
-    for node in _run_by_others(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield from _files_of(alias.name, root, package)
-        elif isinstance(node, ast.ImportFrom):
-            below = path.parents[node.level - 1] if 0 < node.level <= len(path.parents) else root
-            within = "" if node.level else package
-            for name in dict.fromkeys([node.module or "", *(f"{node.module or ''}.{a.name}" for a in node.names)]):
-                yield from _files_of(name.strip("."), below, within)
-
-
-def _run_by_others(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes, without those that are only for a type checker, or for the file as a script."""
-    for inner in ast.iter_child_nodes(node):
-        if isinstance(inner, ast.If) and _OTHERWISE & {getattr(n, "id", "") for n in ast.walk(inner.test)}:
-            for one in inner.orelse:
-                yield from (one, *_run_by_others(one))
-        else:
-            yield inner
-            yield from _run_by_others(inner)
-
-
-def _files_of(name: str, root: Path, package: str) -> Iterator[Path]:
-    """The files of a module below `root`, with those of the packages around it."""
-    words = name.split(".")
-    if not name or (package and words[0] != package):
-        return
-    for i in range(len(words)):
-        base = root.joinpath(*words[: i + 1])
-        yield from (path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file())
-
-
 def _own(name: str) -> OwnLaw:
     """The law of one's own, loaded once for each content of its files. Raises `LawError`."""
     source = find(name)
@@ -316,7 +145,7 @@ def _own(name: str) -> OwnLaw:
         return _LATEST[name]  # what this process has imported, whatever the file is edited to later
     if key not in _LOADED:
         module = _run_module(source) if source.is_module else _run_file(source)
-        kind = _kind(source, module)
+        kind = kind_in(source, module)
         _LOADED[key] = _BY_CLASS.setdefault(kind.value, OwnLaw(source, kind))
         copyreg.pickle(kind.value, _reduced)
     _LATEST[name] = _LOADED[key]
@@ -383,84 +212,3 @@ def _raised(source: Source, error: BaseException) -> str:
         trace = trace.tb_next
     at = f"{source.main}:{line}" if line else str(source.main)
     return f"{at}: cannot be loaded: {type(error).__name__}: {error}"
-
-
-def _kind(source: Source, module: ModuleType) -> LawKind:
-    """The law of a module. Raises `LawError` with everything that it lacks."""
-    value: Any = getattr(module, source.class_name, None)
-    if not isinstance(value, type):
-        laws = [name for name, one in vars(module).items() if isclass(one) and one.__module__ == module.__name__]
-        there = f"it has {', '.join(laws)}" if laws else "it has no class"
-        raise LawError(
-            f"{source.main}: there is no class {source.class_name}, {there}{did_you_mean(source.class_name, laws)}"
-        )
-    sets = getattr(value, "gain_sets", getattr(module, "GAIN_SETS", {}))
-    wrong = [*_wrong_with(value), *_wrong_sets(value, sets)]
-    if wrong:
-        raise LawError(f"{source.main}: {source.class_name} is not a law yet: {'; '.join(wrong)}")
-    return LawKind(value, sets, next(iter(sets), ""), getattr(module, "RULES", {}))
-
-
-def _wrong_with(value: type) -> Iterator[str]:
-    """Everything that a class lacks to be a law, and what is wrong with its fields."""
-    own = vars(value)
-    params = getattr(value, "__dataclass_params__", None)
-    if not is_dataclass(value) or ("__dataclass_params__" not in own and own.get("__annotations__")):
-        yield "it is no dataclass: write @dataclass(frozen=True) above it"
-    elif params and not params.frozen:
-        yield "it is not frozen: write @dataclass(frozen=True)"
-    for member in _MEMBERS:
-        if not hasattr(value, member) and member not in _names(value):
-            yield f"it lacks {_wanted(member)}"
-    for name in _FIELDS:
-        if name not in _names(value):
-            yield f"it lacks {_wanted(name)}"
-    if is_dataclass(value):
-        yield from _wrong_fields(value)
-
-
-def _wanted(member: str) -> str:
-    return {
-        "start": "start(self, context), which returns the function from an Observation to a Guidance",
-        "command": 'command = "heading_rate", the quantity that it limits',
-        "broken_conditions": "broken_conditions(self, speed_ratio), a list of sentences, perhaps empty",
-        "standoff": "the field standoff: float = 200.0, in m",
-        "max_heading_rate": "the field max_heading_rate: float = 0.087, in rad/s",
-    }[member]
-
-
-def _names(value: type) -> list[str]:
-    return [field.name for field in fields(value)] if is_dataclass(value) else []
-
-
-def _wrong_fields(value: type) -> Iterator[str]:
-    try:
-        settings = schema_of(value).settings.values()
-    except Exception as error:  # of an annotation that means nothing here
-        yield f"the annotations of its fields cannot be read: {error}"
-        return
-    for setting in settings:
-        if setting.name == "name":
-            yield "a field cannot be called name: that is the law's own in [flight.law]"
-        if setting.table or not _is_plain(setting):
-            yield f"the field {setting.name} must be a float, int, bool, str, Literal or a tuple of these"
-        if setting.name in _FIELDS and setting.kind is not float:
-            yield f"the field {setting.name} must be a float"
-        if setting.name == "gains" and setting.kind is not str:
-            yield 'the field gains must be text: gains: str = "custom"'
-
-
-def _is_plain(setting: Setting) -> bool:
-    return setting.kind in (float, int, bool, str) or get_origin(setting.kind) is Literal
-
-
-def _wrong_sets(value: type, sets: Any) -> Iterator[str]:
-    if not isinstance(sets, Mapping) or not all(isinstance(numbers, Mapping) for numbers in sets.values()):
-        yield "its gain_sets must be numbers by the name of a field, by the name of a set"
-        return
-    for label, numbers in sets.items():
-        for name, number in numbers.items():
-            if name not in _names(value):
-                yield f"its gain set {label} sets {name}, which is no field{did_you_mean(name, _names(value))}"
-            elif not isinstance(number, int | float) or not math.isfinite(number):
-                yield f"its gain set {label} has {name} = {number!r}, must be a finite number"
