@@ -7,12 +7,14 @@ from typing import Any, Literal, NamedTuple
 import rerun as rr
 import rerun.blueprint as rrb
 
+from harness.review import value_axis
 from harness.review.charts import Chart, chart_view
 from harness.review.lanes import LANES_OF_SEVERAL
-from harness.review.plots import DECADES, Plot, extent
+from harness.review.plots import DECADES, Plot
 from harness.review.recorder import Recorder
 from harness.review.scene import chase_view, scene_view
 from harness.review.styled import WORDS, Colour, StyledFlight, is_crowd
+from harness.review.value_axis import Size
 
 _WIDTH, _HEIGHT = 1600.0, 905.0  # points: all tabs in a window 1600 wide and 1000 high
 _RIGHT = 950.0  # points: width of the column of plots in the overview
@@ -25,31 +27,14 @@ _METRIC, _METRICS = 26.0, 75.0  # points: height of a row of the metrics, and of
 _LETTER, _BESIDE_LETTERS = 6.1, 55.0  # points: width of a letter in a legend, and of the rest of it
 _DECADES = 190.0  # points: height in which each power of ten has its label
 _ENTRY, _AROUND_LEGEND = 23.5, 70.0  # points: height of a line of a legend, and of the rest of its row
-_DIGIT, _MINUS, _POINT, _BESIDE_DIGITS = 7.3, 7.0, 2.2, 8.5  # points: widths beside a plot
 _AXIS = 35.0  # points: the usual width of the numbers beside a plot
 _LABEL = 30.0  # points: half of a label below a plot
-_AROUND_PLOT = 43.0  # points: height of the title above a plot and of the labels below it
-_APART, _CLEAR = 20.0, 9.0  # points: between numbers beside a plot, and from a number to the end of its axis
-_MOST_WIDENED = 1.7  # times: the most by which the axis of a plot grows, so that a second number stands beside it
-_ENOUGH = 2  # numbers beside a plot: with fewer, its title says its range
 _NEAR = ("range_error", "sliding_variable")  # around the cursor their axes follow the values in view
 _CURSOR = 30.0  # s to either side of the cursor
 _STEPS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s between the labels below plots
 _IN_FRONT_OF: Colour = (72, 72, 72)  # the other flights, where one is in front
 PlayState = Literal["following", "paused"]
 Tab = rrb.Container | rrb.View
-
-
-class _Size(NamedTuple):
-    """Of a view, points."""
-
-    width: float
-    height: float
-
-    @property
-    def plot(self) -> float:
-        """The height of the plot in it."""
-        return max(self.height - _AROUND_PLOT, 1.0)
 
 
 class Content(NamedTuple):
@@ -136,8 +121,8 @@ def _whole(content: Content) -> Tab:
     needed = [_AROUND_LEGEND + _ENTRY * _entries(plot) if plot in legends else 0.0 for plot in plots]
     needed = [_DECADES if plot.name == DECADES else height for plot, height in zip(plots, needed, strict=True)]
     heights = _heights(needed, _HEIGHT - lanes_height)
-    sizes = [_Size(_RIGHT, height) for height in heights]
-    widest = max(map(_beside, plots, sizes), default=0.0)
+    sizes = [Size(_RIGHT, height) for height in heights]
+    widest = max(map(value_axis.width, plots, sizes), default=0.0)
     views = [
         _strip(plot, content, gutter, size, widest, legend=plot in legends)
         for plot, size in zip(plots, sizes, strict=True)
@@ -151,8 +136,8 @@ def _cells(content: Content) -> Tab:
     columns = 2 if len(content.flights) <= 4 else 3
     width, height = _RIGHT / columns, _HEIGHT / math.ceil(len(content.flights) / columns)
     error, rate = content.plots(DECADES)[0], content.plots("heading_rate")[0]
-    tall, low = _Size(width, 0.6 * height), _Size(width, 0.4 * height)
-    widest = max(_beside(error, tall), _beside(rate, low))
+    tall, low = Size(width, 0.6 * height), Size(width, 0.4 * height)
+    widest = max(value_axis.width(error, tall), value_axis.width(rate, low))
     cells = []
     for flight in content.flights:
         views = [
@@ -175,8 +160,10 @@ def _around_the_cursor(content: Content) -> Tab:
         plots = content.plots("heading_rate") * len(flights)
     else:
         plots = [plot for plot in content.overview if plot.name != DECADES]
-    size = _Size(0.6 * _WIDTH, _HEIGHT / max(1, len(plots)))
-    besides = [_beside_settled(plot, size) if plot.name in _NEAR else _beside(plot, size) for plot in plots]
+    size = Size(0.6 * _WIDTH, _HEIGHT / max(1, len(plots)))
+    besides = [
+        value_axis.settled_width(plot, size) if plot.name in _NEAR else value_axis.width(plot, size) for plot in plots
+    ]
     widest = max(besides, default=0.0)
     right = []
     of_flight = flights if content.crowd else [None] * len(plots)
@@ -192,7 +179,7 @@ def _aircraft(content: Content) -> Tab:
     if not content.crowd:
         return _stack_of(content.aircraft, content, "Aircraft")
     plots = content.plots("bank", "sideslip", "airspeed", "altitude")
-    size = _Size(_WIDTH / len(plots), _HEIGHT / len(content.flights))
+    size = Size(_WIDTH / len(plots), _HEIGHT / len(content.flights))
     views = [
         _strip(plot, content, 0.0, size, legend=False, alone=flight, title=f"{flight.name}: {_of(plot, flight)}")
         for flight in content.flights
@@ -207,7 +194,7 @@ def _target(content: Content) -> Tab:
         left: Tab = scene_view(content.flights, 0.6, "Target and circle")
         plots = [seen, *plots]
     else:
-        below = _strip(seen, content, _gutter([seen], 530.0), _Size(530.0, _HEIGHT / 3.0))
+        below = _strip(seen, content, _gutter([seen], 530.0), Size(530.0, _HEIGHT / 3.0))
         left = rrb.Vertical(scene_view(content.flights, 0.95, "Target and circle"), below, row_shares=(2.0, 1.0))
     right = _grid(plots, content, 2, 1060.0)
     return rrb.Horizontal(left, right, column_shares=(1.0, 2.0), name="Target")
@@ -253,8 +240,8 @@ def _grid(
 ) -> rrb.Container:
     """A grid of plots whose time axes line up, with legends unless these only repeat colours."""
     gutter = _gutter(plots, width / columns) if legend else 0.0
-    size = _Size(width / columns, _HEIGHT / max(1, math.ceil(len(plots) / columns)))
-    widest = max((_beside(plot, size) for plot in plots), default=0.0)
+    size = Size(width / columns, _HEIGHT / max(1, math.ceil(len(plots) / columns)))
+    widest = max((value_axis.width(plot, size) for plot in plots), default=0.0)
     views = [_strip(plot, content, gutter, size, widest, legend=legend) for plot in plots]
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
@@ -263,7 +250,7 @@ def _strip(
     plot: Plot,
     content: Content,
     gutter: float,
-    size: _Size,
+    size: Size,
     widest: float = 0.0,
     *,
     legend: bool = True,
@@ -273,14 +260,14 @@ def _strip(
 ) -> rrb.View:
     """A plot over the whole flight; see `_view`. `widest` are the numbers beside the plots above and below."""
     near = content.growing and plot.name != "heading_rate"  # its range is known: the limit
-    beside = widest if near else _beside(plot, size)
+    beside = widest if near else value_axis.width(plot, size)
     axis = _whole_flight(content, gutter, size.width, beside, max(widest, beside))
     return _view(plot, size, axis, legend=legend, title=title or plot.title, near=near, alone=alone, front=front)
 
 
 def _view(
     plot: Plot,
-    size: _Size,
+    size: Size,
     axis: rrb.TimeAxis,
     *,
     title: str,
@@ -300,8 +287,8 @@ def _view(
         for entity, series in entities.items()
         if front is not None and series.flight not in ("", front.name)
     }
-    low, high = _scale(plot, size)
-    if not near and contents and len(_numbers(low, high, size)) < _ENOUGH:
+    low, high = value_axis.scale(plot, size)
+    if not near and contents and len(value_axis.numbers(low, high, size)) < value_axis.ENOUGH:
         decimals = max(0, -math.floor(math.log10(0.2 * (high - low))))
         title = f"{title}, {low:.{decimals}f} to {high:.{decimals}f}"
     return rrb.TimeSeriesView(
@@ -338,63 +325,6 @@ def _around(missing: float, width: float) -> rrb.TimeAxis:
     both_ends = (-_CURSOR - point * missing, _CURSOR + point * _LABEL)
     ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=s) for s in both_ends)
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(*ends))
-
-
-def _scale(plot: Plot, size: _Size) -> tuple[float, float]:
-    """The range of a plot in a view of this size: with two numbers beside it, if it grows little, and none of them cut.
-
-    Rerun labels multiples of powers of ten.
-    """
-    low, high = plot.span
-    step = _step(low, high, size)
-    below, above = step * math.floor(low / step), step * math.ceil(high / step)
-    wider = sorted(((low, above), (below, high), (below, above)), key=lambda ends: ends[1] - ends[0])
-    for ends in ((low, high), *wider):
-        begin, end = _clear_of_numbers(*ends, size)
-        if len(_numbers(begin, end, size)) >= _ENOUGH and end - begin <= _MOST_WIDENED * (high - low):
-            return begin, end
-    return _clear_of_numbers(low, high, size)
-
-
-def _clear_of_numbers(low: float, high: float, size: _Size) -> tuple[float, float]:
-    """The range, grown where a number would stand so close to its end that it is cut."""
-    numbers = _numbers(low, high, size)
-    if not numbers:
-        return low, high
-    clear = _CLEAR * (high - low) / size.plot
-    return min(low, numbers[0] - clear), max(high, numbers[-1] + clear)
-
-
-def _numbers(low: float, high: float, size: _Size) -> list[float]:
-    """The numbers that Rerun writes beside a plot."""
-    step = _step(low, high, size)
-    return [n * step for n in range(math.ceil(low / step), math.floor(high / step) + 1)]
-
-
-def _step(low: float, high: float, size: _Size) -> float:
-    """The smallest power of ten whose multiples are far enough from each other to be written beside a plot."""
-    return float(10.0 ** (math.floor(math.log10(_APART * (high - low) / size.plot)) + 1))
-
-
-def _beside(plot: Plot, size: _Size) -> float:
-    """The width of the numbers beside a plot, points."""
-    return _written(*_scale(plot, size), size)
-
-
-def _beside_settled(plot: Plot, size: _Size) -> float:
-    """The same where the axis follows the values in view, of the second half of the flight: it ends at the values."""
-    halves = [series._replace(values=series.values[len(series.values) // 2 :]) for series in plot.series]
-    low, high = extent(halves)
-    flat = 0.5 if high == low else 0.0  # to either side, as Rerun does
-    return _written(low - flat, high + flat, size)
-
-
-def _written(low: float, high: float, size: _Size) -> float:
-    """The width of the numbers that Rerun writes beside an axis, points."""
-    decimals = max(0, -round(math.log10(_step(low, high, size))))
-    texts = [f"{number:.{decimals}f}" for number in _numbers(low, high, size)]
-    widths = [_DIGIT * sum(map(str.isdigit, text)) + _MINUS * ("-" in text) + _POINT * ("." in text) for text in texts]
-    return _BESIDE_DIGITS + max(widths, default=_DIGIT)
 
 
 def _of(plot: Plot, flight: StyledFlight) -> str:
