@@ -18,9 +18,10 @@ from harness.key import files, identity
 from harness.loop import simulate
 from harness.provenance import provenance
 from harness.runs.far import FarFlight
+from harness.runs.journal import JOURNAL
 from harness.runs.parcels import Parcels
 from harness.runs.row import result_of, row
-from harness.runs.store import JOURNAL, Store
+from harness.runs.store import Store
 from harness.runs.wall_time import typical_wall_time
 from harness.runs.workers import WorkerResult
 from harness.tables import markdown

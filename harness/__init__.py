@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from harness.margins import Assess
     from harness.plants.plant import Outcome, PlantError, Start
     from harness.review.viewer import ViewerError
+    from harness.runs.journal import StoreError
     from harness.runs.results import load_results
-    from harness.runs.store import StoreError
     from harness.runs.workers import WorkersError
     from harness.settings import load_flight
     from harness.verdict.comparison import Comparison

@@ -18,7 +18,7 @@ from harness.key import identity
 from harness.runs import cluster as clusters
 from harness.runs.cluster import _unfit, connected
 from harness.runs.far import Report, versions
-from harness.runs.store import StoreError, reading
+from harness.runs.journal import StoreError, reading
 from harness.runs.wall_time import WallTime
 from harness.runs.workers import Task, WorkersError
 from tests.builders import ROOT, command, copied_airframe, digests, fly_matrix, invoke, words_of, write

@@ -27,9 +27,10 @@ from pebble.pool.channel import WorkerChannel
 import harness
 from autopilot.guidance import Guidance, LawStep, Observation
 from harness.review.reading import read_logs
+from harness.runs.journal import JOURNAL, StoreError, reading
 from harness.runs.recordings import recording_path
 from harness.runs.results import export
-from harness.runs.store import JOURNAL, Store, StoreError, reading
+from harness.runs.store import Store
 from harness.runs.workers import Task, WorkerResult, fly_task
 from tests.builders import WORKERS, OwnLaw, command, digests, fly_matrix, invoke, python, turning, words_of, write
 

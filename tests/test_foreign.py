@@ -14,7 +14,7 @@ import pytest
 
 import harness
 from harness.files import content_hash
-from harness.runs.store import JOURNAL
+from harness.runs.journal import JOURNAL
 from tests import builders
 from tests.builders import FLIGHT, HERE, WORKERS, copied_airframe, fly_matrix, write
 from tests.confined import Confined, Ended

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from autopilot.laws import LAWS, law
+from harness.runs.journal import JOURNAL
 from harness.runs.matrix import read_matrix
 from harness.runs.run import Options, run
-from harness.runs.store import JOURNAL
 from harness.settings import load_flight, read_settings
 from tests.builders import command, write
 

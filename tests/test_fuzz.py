@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import harness
 from harness.cli.main import COMMANDS
-from harness.runs.store import JOURNAL
+from harness.runs.journal import JOURNAL
 from harness.settings import document, load_flight
 from tests import mutations, recorded_logs
 from tests.builders import EXPERIMENTS, copied_airframe, invoke, write

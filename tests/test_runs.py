@@ -22,9 +22,10 @@ import harness
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.runs.comparable import comparable
 from harness.runs.description import description
+from harness.runs.journal import JOURNAL, reading
 from harness.runs.matrix import read_matrix
 from harness.runs.results import PARQUET, export
-from harness.runs.store import JOURNAL, find, reading
+from harness.runs.store import find
 from harness.runs.workers import Task, WorkerResult
 from harness.settings import read_settings
 from harness.verdict.pairs import settings_of

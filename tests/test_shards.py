@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 import harness
+from harness.runs.journal import JOURNAL, StoreError
 from harness.runs.matrix import Shard, read_matrix
 from harness.runs.merge import merge
-from harness.runs.store import JOURNAL, StoreError
 from harness.settings import read_settings
 from tests.builders import invoke, write
 

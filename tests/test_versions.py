@@ -13,8 +13,8 @@ import pytest
 
 import harness
 from harness.files import content_hash
+from harness.runs.journal import JOURNAL
 from harness.runs.results import versions
-from harness.runs.store import JOURNAL
 from tests.builders import (
     MATRIX,
     ROOT,

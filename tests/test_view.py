@@ -12,9 +12,9 @@ import pytest
 from harness.log import COLUMNS
 from harness.plants.ladder import PLANTS
 from harness.review.reading import read_logs
+from harness.runs.journal import JOURNAL
 from harness.runs.logs import distinctly_named
 from harness.runs.results import load_results
-from harness.runs.store import JOURNAL
 from tests.builders import HERE, fly_matrix, invoke, write
 
 MATRIX = """\

@@ -24,7 +24,8 @@ def read_comparison(
     from harness.comparison import compare_chosen
     from harness.error import SettingsError
     from harness.runs.comparable import comparable
-    from harness.runs.store import StoreError, last_run
+    from harness.runs.journal import StoreError
+    from harness.runs.store import last_run
     from harness.settings.columns import DIRECTORY
     from harness.verdict.pairs import CompareError
     from harness.verdict.report import origin_of

@@ -32,8 +32,8 @@ def flights_of(places: Sequence[str]) -> dict[str, FlightLog]:
 
 def row(folder: Path, beginning: str) -> FlightLog:
     """The log of a row of a run, read or flown again, with what the user should know on standard error."""
+    from harness.runs.journal import StoreError
     from harness.runs.logs import flight_of_row
-    from harness.runs.store import StoreError
     from harness.settings import SettingsError
 
     try:
@@ -56,8 +56,8 @@ def recorded(path: Path) -> dict[str, FlightLog]:
 
 def choose_from(folder: Path, how: str) -> BadInput:
     """What is said when a folder is named without a flight: its flights, and how one is chosen."""
+    from harness.runs.journal import StoreError
     from harness.runs.results import load_results
-    from harness.runs.store import StoreError
 
     try:
         flights = load_results(folder)

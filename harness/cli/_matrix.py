@@ -200,8 +200,8 @@ def print_endings(out: Path) -> None:
     """How flights ended that did not last, and how many did so."""
     from collections import Counter
 
+    from harness.runs.journal import StoreError
     from harness.runs.results import load_results
-    from harness.runs.store import StoreError
 
     try:
         flights = load_results(out)

@@ -28,9 +28,9 @@ def demo(out: Path) -> None:
     from harness.cli._input import BadInput
     from harness.cli._matrix import fly_matrix, print_survey, surveyed
     from harness.cli._paths import writable_folder
+    from harness.runs.journal import StoreError
     from harness.runs.matrix import read_matrix
     from harness.runs.run import Options, positions_done
-    from harness.runs.store import StoreError
     from harness.runs.workers import WorkersError
     from harness.settings import read_settings
 

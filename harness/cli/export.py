@@ -53,8 +53,9 @@ def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
 def _table(what: str, flight: str | None) -> tuple[pd.DataFrame, str]:
     """The log, and a name for the file."""
     from harness.cli._input import BadInput
+    from harness.runs.journal import StoreError
     from harness.runs.recall import row_address
-    from harness.runs.store import StoreError, find
+    from harness.runs.store import find
     from harness.settings import SettingsError
 
     try:

@@ -159,8 +159,9 @@ def _stream(name: str, title: str, pace: float | None, port: int | None) -> Live
 def _earlier(text: str) -> FlightRow:
     """The row of an earlier flight."""
     from harness.cli._input import BadInput
+    from harness.runs.journal import StoreError
     from harness.runs.recall import row_address
-    from harness.runs.store import StoreError, find
+    from harness.runs.store import find
 
     place = row_address(text)
     if place is None:
@@ -175,8 +176,8 @@ def _earlier(text: str) -> FlightRow:
 
 def _recalled(place: RowAddress) -> Recalled:
     from harness.cli._input import BadInput
+    from harness.runs.journal import StoreError
     from harness.runs.recall import recall
-    from harness.runs.store import StoreError
 
     try:
         return recall(place)

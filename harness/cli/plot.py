@@ -80,7 +80,7 @@ def _map(folder: Path, metric: str, where: tuple[str, ...]) -> tuple[Picture, st
     from harness.drawing import COLUMN, PAGE, picture
     from harness.limit_cycle.predicted import MARGIN
     from harness.runs.comparable import comparable
-    from harness.runs.store import StoreError
+    from harness.runs.journal import StoreError
     from harness.settings import SettingsError
     from harness.verdict import figures, grid
     from harness.verdict.following import with_predicted

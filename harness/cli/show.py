@@ -47,9 +47,10 @@ def show(
     from harness.cli._input import BadInput
     from harness.comparison import chosen as with_settings
     from harness.runs.description import description
+    from harness.runs.journal import StoreError, taking_apart
     from harness.runs.recall import other_versions, row_address
     from harness.runs.results import load_results
-    from harness.runs.store import StoreError, find, taking_apart
+    from harness.runs.store import find
     from harness.settings.laws import short_names
     from harness.verdict.pairs import CompareError, varying
 

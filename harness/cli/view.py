@@ -84,9 +84,9 @@ def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, Fl
     from harness.cli._flights import say
     from harness.cli._input import BadInput
     from harness.review.styled import MOST
+    from harness.runs.journal import StoreError
     from harness.runs.logs import distinctly_named, pair_of_row
     from harness.runs.recall import row_address
-    from harness.runs.store import StoreError
     from harness.settings import SettingsError
 
     if pair is not None and flights:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from harness import key
 from harness.margins import Assess
+from harness.runs.journal import StoreError
 from harness.runs.recall import load_laws
 from harness.runs.results import load_results, versions
-from harness.runs.store import StoreError, last_run
+from harness.runs.store import last_run
 from harness.settings import settings_from_text
 from harness.settings.columns import DIRECTORY
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from harness.files import make_folder
 from harness.plants.plant import Outcome
-from harness.runs.store import FLIGHTS, JOURNAL, StoreError, last_run, reading
+from harness.runs.journal import JOURNAL, StoreError, reading
+from harness.runs.store import FLIGHTS, last_run
 
 _FAILED = ", ".join(repr(outcome.value) for outcome in Outcome if outcome.failed)
 _MOST_KEYS = 3  # told one by one

@@ -16,8 +16,9 @@ from harness.flight import Flight
 from harness.key import version_of
 from harness.log import FlightLog
 from harness.runs import apart
+from harness.runs.journal import StoreError, reading
 from harness.runs.row import FlightResult, result_of
-from harness.runs.store import Stored, StoreError, content, examples, find, reading
+from harness.runs.store import Stored, content, examples, find
 from harness.settings import SettingsError, SettingsFile, flight_from_document, overridden, without_former_names
 from harness.settings.law_source import FILES
 from harness.settings.laws import is_unchanged

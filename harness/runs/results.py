@@ -10,7 +10,8 @@ from harness.files import as_text, replacing
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
-from harness.runs.store import JOURNAL, StoreError, last_run, reading, state
+from harness.runs.journal import JOURNAL, StoreError, reading, state
+from harness.runs.store import last_run
 from harness.settings.columns import by_column, is_setting
 from harness.settings.law_source import FILES
 

@@ -11,10 +11,11 @@ from harness.key import Identity, files, identity, version_of
 from harness.plants.plant import Outcome
 from harness.provenance import decided_bits, decides_bits, differences, provenance
 from harness.runs.cluster import Cluster
+from harness.runs.journal import JOURNAL, reading
 from harness.runs.matrix import Matrix
 from harness.runs.recordings import lacks_recording, recording_path
 from harness.runs.row import row
-from harness.runs.store import JOURNAL, Store, examples, positions, reading
+from harness.runs.store import Store, examples, positions
 from harness.runs.wall_time import TimeLeft, WallTime
 from harness.runs.workers import TIMEOUT, Done, Fly, Task, WorkersError, fly_all, fly_task
 from harness.settings import SettingsError, flight_from_document

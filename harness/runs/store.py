@@ -3,57 +3,23 @@
 import json
 import os
 import shlex
-import socket
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
-from errno import EACCES, EAGAIN
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from harness.error import HarnessError
 from harness.files import as_text, content_hash, make_folder, read
 from harness.key import Version
 from harness.plants.plant import Outcome
 from harness.provenance import Provenance, now
+from harness.runs.journal import JOURNAL, WAIT, StoreError, format_of, has_grown, locked, reading, store_errors, upgrade
 from harness.runs.row import FlightResult, FlightRow
 from harness.toml_text import shortened
 
-JOURNAL, LOCK, FLIGHTS = "journal.sqlite", "lock", "flights"
+LOCK, FLIGHTS = "lock", "flights"
 COMMIT_EVERY = 0.5  # s: the longest time that a row waits to be committed
-_APPLICATION = 0x53544F46  # "STOF", SQLite's application id of the journal
-_FORMAT = 3  # of the journal, in SQLite's user_version
-_RANDOM = "lower(hex(randomblob(16)))"
-_WAIT = 60.0  # s, for another process to let go of the journal
-
-_TABLES = f"""
-CREATE TABLE runs (id INTEGER PRIMARY KEY, {", ".join(Provenance._fields)}, ended);
-CREATE TABLE files (hash TEXT PRIMARY KEY, content BLOB NOT NULL);
-CREATE TABLE versions (id TEXT PRIMARY KEY, decides TEXT NOT NULL);
-CREATE TABLE flights (
-    key TEXT PRIMARY KEY, run INTEGER NOT NULL, position INTEGER NOT NULL, version TEXT NOT NULL,
-    outcome TEXT NOT NULL, reason TEXT NOT NULL, digest TEXT NOT NULL, settings TEXT NOT NULL, metrics TEXT NOT NULL,
-    feasibility_margin_deg_s REAL, seconds REAL, final TEXT NOT NULL
-);
-CREATE INDEX flights_by_version ON flights (version);
-CREATE INDEX flights_done ON flights (key, version, outcome);
-CREATE TABLE positions (
-    matrix TEXT NOT NULL, position INTEGER NOT NULL, key TEXT NOT NULL, PRIMARY KEY (matrix, position)
-) WITHOUT ROWID;
-CREATE TABLE state (id TEXT NOT NULL);
-INSERT INTO state VALUES ({_RANDOM});
-PRAGMA application_id = {_APPLICATION};
-"""
-_UPGRADES = {  # by format, what makes the next one of it
-    1: f"DROP TABLE changes; CREATE TABLE state (id TEXT NOT NULL); INSERT INTO state VALUES ({_RANDOM});",
-    2: "ALTER TABLE runs ADD COLUMN processor;",
-}
-
-
-class StoreError(HarnessError):
-    """The directory of a run cannot be used; the message says why in one line."""
 
 
 class Stored(NamedTuple):
@@ -76,13 +42,13 @@ class Store:
             raise StoreError(f"{folder}: is a file, not a folder")
         try:
             make_folder(folder)
-            self._lock = _locked(folder / LOCK)
+            self._lock = locked(folder / LOCK)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be written: {error.strerror or error}") from None
         try:
-            with _store_errors(folder):
-                self._journal = sqlite3.connect(folder / JOURNAL, timeout=_WAIT, isolation_level=None)
-                _upgrade(self._journal, _format(self._journal, folder, thorough=True))
+            with store_errors(folder):
+                self._journal = sqlite3.connect(folder / JOURNAL, timeout=WAIT, isolation_level=None)
+                upgrade(self._journal, format_of(self._journal, folder, thorough=True))
         except BaseException:
             os.close(self._lock)
             raise
@@ -113,7 +79,7 @@ class Store:
 
     def latest_run(self) -> Mapping[str, Any] | None:
         """The provenance of the latest run; None without any flight."""
-        with _store_errors(self.folder):
+        with store_errors(self.folder):
             flown = self._journal.execute("SELECT 1 FROM flights LIMIT 1").fetchone()
             return _latest_run(self._journal) if flown else None
 
@@ -167,9 +133,9 @@ class Store:
     def commit(self) -> None:
         """Commits all changes."""
         if self._begun is not None:
-            with _store_errors(self.folder):
+            with store_errors(self.folder):
                 if self._grown:
-                    self._journal.execute(f"UPDATE state SET id = {_RANDOM}")
+                    has_grown(self._journal)
                 self._journal.execute("COMMIT")
             self._begun, self._grown = None, False
 
@@ -179,7 +145,7 @@ class Store:
             self.commit()
 
     def _change(self, statement: str, values: Iterable[object]) -> None:
-        with _store_errors(self.folder):
+        with store_errors(self.folder):
             if self._begun is None:
                 self._journal.execute("BEGIN IMMEDIATE")
                 self._begun = time.monotonic()
@@ -188,52 +154,8 @@ class Store:
         self.tick()
 
     def _all(self, statement: str, values: Iterable[object] = ()) -> list[Any]:
-        with _store_errors(self.folder):
+        with store_errors(self.folder):
             return self._journal.execute(statement, tuple(values)).fetchall()
-
-
-@contextmanager
-def reading(folder: Path, *, thorough: bool = False) -> Iterator[sqlite3.Connection]:
-    """The journal, open for reading, also while a run writes to it; one of an earlier format as an upgraded copy.
-
-    With `thorough` all of it is checked for damage, also what is not read. Raises `StoreError`; also where what is done
-    with it fails, since that is to take its rows apart.
-    """
-    path = folder / JOURNAL
-    if not path.is_file():
-        raise StoreError(f"{folder}: holds no results of `harness run` (there is no {JOURNAL})")
-    with _store_errors(folder):
-        # Opened for writing where that is allowed: a run that was killed may have left half a commit to roll back.
-        mode = "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
-        journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=_WAIT)
-        with closing(journal), closing(sqlite3.connect("")) as copy:
-            journal.execute("PRAGMA query_only = ON")
-            journal.execute("PRAGMA trusted_schema = OFF")  # it may be somebody else's
-            version = _format(journal, folder, thorough=thorough)
-            if version != _FORMAT:
-                journal.backup(copy)
-                _upgrade(copy, version)
-            with taking_apart(folder):
-                yield journal if version == _FORMAT else copy
-
-
-@contextmanager
-def taking_apart(folder: Path) -> Iterator[None]:
-    """For what takes rows of the journal apart: raises `StoreError` where that fails, since a row may hold anything."""
-    try:
-        yield
-    except HarnessError:
-        raise
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        what = f"{type(error).__name__}: {shortened(str(error))}"
-        why = f"{folder / JOURNAL}: is damaged: a row cannot be read ({what}); move it away"
-        raise StoreError(why) from error
-
-
-def state(journal: sqlite3.Connection) -> str:
-    """A random text that is new whenever flights were added: equal exactly for one journal with the same flights."""
-    ((text,),) = journal.execute("SELECT id FROM state")
-    return str(text)
 
 
 def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
@@ -350,73 +272,3 @@ def content(folder: Path, digest: str) -> bytes:
     if row is None:
         raise StoreError(f"{folder}: the store lacks a file that the flight read")
     return bytes(row[0])
-
-
-@contextmanager
-def _store_errors(folder: Path) -> Iterator[None]:
-    """Turns an error of SQLite into a `StoreError` that says what to do."""
-    try:
-        yield
-    except sqlite3.DatabaseError as error:
-        name = getattr(error, "sqlite_errorname", "") or ""
-        path = folder / JOURNAL
-        if name.startswith("SQLITE_FULL"):
-            why = f"{folder}: the disk is full: all but the latest flights are kept; make room, then run it again"
-        elif name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
-            why = f"{path}: cannot be written: {error}"
-        elif name.startswith("SQLITE_IOERR"):
-            why = f"{path}: {error}: finished flights are kept; repair the disk, then run the same command again"
-        elif name.startswith("SQLITE_BUSY"):
-            why = f"{path}: another process has locked it for {_WAIT:g} s"
-        else:
-            why = f"{path}: is damaged, or not a journal of the harness ({error}): nothing was changed; move it away"
-        raise StoreError(why) from None
-
-
-def _format(journal: sqlite3.Connection, folder: Path, *, thorough: bool) -> int:
-    """The format of the journal; 0 while it has no tables: a run may have been killed before it made them.
-
-    Raises `StoreError` for a file that is no journal, or of a later format or, when `thorough`, is damaged.
-    """
-    ((application,),) = journal.execute("PRAGMA application_id")
-    ((version,),) = journal.execute("PRAGMA user_version")
-    path = folder / JOURNAL
-    if not journal.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-        return 0
-    if application != _APPLICATION:
-        raise StoreError(f"{path}: is not a journal of the harness: nothing was changed; move it away")
-    if not 1 <= version <= _FORMAT:
-        raise StoreError(
-            f"{path}: has format {version}, this harness reads formats 1 to {_FORMAT}: use the harness that wrote it, "
-            "or another directory"
-        )
-    if thorough and (damage := journal.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
-        raise StoreError(f"{path}: is damaged ({' '.join(damage.split())}): nothing was changed; move it away")
-    return int(version)
-
-
-def _upgrade(journal: sqlite3.Connection, version: int) -> None:
-    """Makes a journal of today's format of one of this format."""
-    if version == _FORMAT:
-        return
-    script = "".join(_UPGRADES[earlier] for earlier in range(version, _FORMAT)) if version else _TABLES
-    journal.executescript(f"BEGIN; {script} PRAGMA user_version = {_FORMAT}; COMMIT;")
-
-
-def _locked(path: Path) -> int:
-    """Locks the file and returns it open. The system releases the lock when this process ends, however it ends."""
-    import fcntl
-
-    lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        by = os.read(lock, 200).decode(errors="replace").strip()
-        os.close(lock)
-        if error.errno not in (EACCES, EAGAIN):
-            why = f"its file system cannot lock a file ({error.strerror}): use a folder on another one"
-            raise StoreError(f"{path.parent}: {why}") from None
-        raise StoreError(f"{path.parent}: another run writes to it ({by}): wait for it, or use another --out") from None
-    os.ftruncate(lock, 0)
-    os.write(lock, f"process {os.getpid()} on {socket.gethostname()} since {now()}\n".encode())
-    return lock

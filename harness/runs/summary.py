@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.plant import Outcome
+from harness.runs.journal import reading
 from harness.runs.matrix import Matrix
-from harness.runs.store import reading
 from harness.settings.columns import by_column
 from harness.settings.laws import is_own, short_names
 
