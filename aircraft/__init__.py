@@ -96,7 +96,9 @@ def keep_written(airframe: Path) -> None:
     about = (
         "# Written with the model: a hash of airframe.toml and inner_loop.toml, that a change of them is not missed.\n"
     )
-    written(airframe).write_text(f'{about}data = "{_data_hash(airframe)}"\n', encoding="utf-8")
+    partial = written(airframe).with_suffix(".partial")
+    partial.write_text(f'{about}data = "{_data_hash(airframe)}"\n', encoding="utf-8")
+    partial.replace(written(airframe))
 
 
 def is_stale(airframe: Path) -> bool:

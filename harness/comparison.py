@@ -91,7 +91,8 @@ def chosen(flights: pd.DataFrame, where: Mapping[str, object]) -> pd.DataFrame:
             if value not in there:
                 known = ", ".join(map(str, there[:20])) + (", ..." if len(there) > 20 else "")
                 hint = did_you_mean(value, map(str, there))
-                raise CompareError(f"where: no flight has {key} = {shown(value)}{hint}; there is {known}")
+                asked = f"{value:g}" if isinstance(value, float) else shown(value)
+                raise CompareError(f"where: no flight has {key} = {asked}{hint}; there is {known}")
         flights = flights[column.isin(values)]
         if not len(flights):
             raise CompareError(f"where: no flight is left that has {shown(where)}")

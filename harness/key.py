@@ -18,8 +18,8 @@ from harness.plants.ladder import PLANTS, identification_files
 from harness.settings import document
 from harness.settings.laws import source_of
 
-PHYSICS_VERSION = 3  # of plants, wind and loop: raised whenever a change there moves a trajectory
-METRICS_VERSION = 6  # of the metrics: raised whenever a change moves the value of one
+PHYSICS_VERSION = 4  # of plants, wind and loop: raised whenever a change there moves a trajectory
+METRICS_VERSION = 7  # of the metrics: raised whenever a change moves the value of one
 
 
 class Version(NamedTuple):

@@ -30,10 +30,10 @@ def settling_time(time: Array, error: Array, tolerance: float, least: float) -> 
     return float(time[first])
 
 
-def overshoot(error: Array) -> float | None:
-    """The largest size of the sign that the error does not begin with; None when it never has that sign."""
+def overshoot(error: Array) -> float:
+    """The largest size of the sign that the error does not begin with; 0 when it never has that sign."""
     beyond = error[error * error[0] < 0.0] if len(error) else error
-    return float(np.abs(beyond).max()) if beyond.size else None
+    return float(np.abs(beyond).max()) if beyond.size else 0.0
 
 
 def unwrapped(angle: Array) -> Array:

@@ -1,5 +1,6 @@
 """Tables for a terminal and for Markdown, and how a number is written in their cells."""
 
+import math
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
@@ -108,7 +109,7 @@ def counted(count: int, noun: str) -> str:
 
 def number(value: float | bool | None, scale: float = 1.0) -> str:
     """`scale` times the value with three significant digits; a dash for none, and yes or no for a truth value."""
-    if value is None:
+    if value is None or math.isnan(value):
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"

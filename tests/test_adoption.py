@@ -4,22 +4,27 @@ import json
 import math
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import aircraft
+from harness import loop
 from harness.adoption import adopt as adopting
 from harness.adoption.adoption import Adoption, Wish
 from harness.adoption.adoption import write as write_files
 from harness.adoption.model import named, source
 from harness.adoption.refusal import RefusalError
+from harness.flight import air_of
 from harness.plants.identified import identified, is_stale
 from harness.plants.model import data_root
 from harness.settings import load_flight
 from harness.studies.adopted_law import FACTORS, Aircraft, LastLap
 from harness.studies.design_rule import by_hand, open_loop, page
-from tests.builders import EXPERIMENTS, HERE, fly_matrix, invoke, write
+from harness.world.wind import Gust
+from tests.builders import EXPERIMENTS, FLIGHT, HERE, fly_matrix, invoke, write
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +59,21 @@ def test_an_adopted_aircraft_flies_the_experiment_that_was_written_for_it(adopte
     assert metrics["altitude_deviation_peak_m"] < 15.0
     assert metrics["sideslip_peak_deg"] < 6.0
     assert metrics["bank_peak_deg"] < math.degrees(aircraft.limits(folder).bank)
+
+
+@pytest.mark.parametrize("name", ["ultra_stick_25e", "c172p"])
+def test_a_gust_meets_an_airframe_of_ours_and_an_adopted_one_at_its_own_time(
+    name: str, adopted: tuple[str, Path]
+) -> None:
+    one = load_flight(adopted[1] / "circle.toml")
+    if name != "c172p":
+        one = replace(FLIGHT, plant="sixdof", aircraft=name)
+    gust = Gust(from_=0.0, to=1.0, velocity=(3.0, -2.0, 0.0))
+    one = replace(one, duration=0.5, wind=replace(one.wind, gusts=(gust,)))
+    log, air = loop.simulate(one), air_of(one)
+    steps = round(one.guidance_period / one.step)
+    wind = [air.horizontal(k * steps) for k in range(len(log))]
+    assert np.column_stack([log["wind_north"], log["wind_east"]]) == pytest.approx(np.array(wind), abs=1e-9)
 
 
 def test_the_course_rate_is_the_commanded_one_and_a_step_winds_nothing_up(adopted: tuple[str, Path]) -> None:

@@ -32,7 +32,7 @@ from harness.recorded.said import as_json, beside_lines, lines
 from harness.verdict.parts import PARTS
 from harness.vocabulary import Verdict
 from harness.world.air import Air
-from tests.builders import invoke, write
+from tests.builders import EXPERIMENTS, invoke, write
 
 LEVEL, AIRSPEED, SIDESLIP = (
     PARTS[column].title for column in ("altitude_deviation_peak_m", "airspeed_deviation", "sideslip_rms_deg")
@@ -387,6 +387,15 @@ def test_no_aircraft_is_fitted_to_a_log_that_does_not_tell_it(
 ) -> None:
     with pytest.raises(LogError, match=reason):
         document(assess(change(log(ON_BOARD).recorded())))
+
+
+def test_a_fit_that_is_refused_costs_neither_page_nor_tables(tmp_path: Path) -> None:
+    short = EXPERIMENTS / "flights" / "lateral_doublet_4.csv"
+    done = invoke("assess", short, "--fit", tmp_path / "a.toml", "--out", tmp_path / "page.html")
+    assert done.exit_code == 2
+    assert "turn relation" in done.stdout
+    assert (tmp_path / "page.html").is_file()
+    assert not (tmp_path / "a.toml").exists()
 
 
 def test_beside_a_flight_of_the_model_itself_the_model_says_the_same() -> None:

@@ -1,6 +1,7 @@
 """Compiled flights: the same bits as Python's, the reasons for which a flight is left to Python, and the choice."""
 
 import math
+import os
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from autopilot.guidance import UNKNOWN, started
 from autopilot.laws import law
 from harness import loop
 from harness.compiled import arithmetic, engine
+from harness.compiled import kernel as kernels
 from harness.compiled.lifted import NotLiftedError, held, module_of
 from harness.flight import Flight, MetricSettings
 from harness.flight_errors import Errors
@@ -298,6 +300,30 @@ def test_a_law_that_holds_what_has_no_hash_is_flown_by_python() -> None:
     flight = replace(FLIGHT, law=OwnLaw(lambda: lambda o: turning(turner())))
     assert engine.why_plain(flight).startswith("what it holds cannot be compared")
     assert engine.simulate(flight).digest == loop.simulate(flight).digest
+
+
+def test_a_power_in_place_is_compiled_with_the_bits_of_python(tmp_path: Path) -> None:
+    own(tmp_path, "q = abs(o.north) + 1.0\n            q **= 0.3")
+    text = (tmp_path / "own.py").read_text().replace("-self.gain * r", "-self.gain * r * q")
+    write(tmp_path / "own.py", text)
+    flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"))
+    assert compiled(flight).digest == loop.simulate(flight).digest
+
+
+def test_kernels_that_were_not_used_for_long_give_way_to_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(5):
+        (tmp_path / f"kernel_{number}.py").touch()
+        os.utime(tmp_path / f"kernel_{number}.py", (2e9 + number, 0.0))
+    kernels._clear(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 5
+    monkeypatch.setattr(kernels, "_KEPT", 2)
+    kernels._clear(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 5  # another process may be about to load them
+    monkeypatch.setattr(kernels, "_YOUNG", -1e9)
+    kernels._clear(tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"kernel_3.py", "kernel_4.py"}
 
 
 def test_laws_with_the_same_step_and_other_constants_share_no_kernel(tmp_path: Path) -> None:

@@ -173,6 +173,15 @@ def test_a_key_that_is_set_is_no_axis(matrix: Read) -> None:
     assert [(m.flight(c).plant, m.flight(c).seed) for c in m.combinations()] == [("sixdof", 1), ("sixdof", 2)]
 
 
+@pytest.mark.parametrize(("plant", "seeds"), [("sixdof", [1]), ("kinematic", [1, 2])])
+def test_an_exclusion_holds_for_the_value_that_is_set_and_for_no_other(
+    matrix: Read, plant: str, seeds: list[int]
+) -> None:
+    text = '[matrix]\nplant = ["kinematic", "sixdof"]\nseed = [1, 2]\n[[exclude]]\nplant = "sixdof"\nseed = 2\n'
+    m = matrix(text, f"plant={plant}")
+    assert [m.flight(c).seed for c in m.combinations()] == seeds
+
+
 def test_flights_that_differ_in_the_plant_alone_are_one_group(matrix: Read) -> None:
     m = matrix('[matrix]\nplant = ["kinematic", "sixdof"]\n"law.gains" = ["paper", "paper_1"]\nseed = [0, 1]\n')
     groups: dict[int, list[object]] = {}

@@ -12,6 +12,7 @@ import harness
 from harness.runs.journal import JOURNAL, StoreError
 from harness.runs.matrix import Shard, read_matrix
 from harness.runs.merge import merge
+from harness.runs.store import FLIGHTS
 from harness.settings import read_settings
 from tests.builders import invoke, write
 
@@ -95,10 +96,15 @@ def test_a_failed_flight_gives_way_to_one_that_was_flown_whichever_comes_first(f
     bad = shutil.copytree(good, tmp_path / "bad")
     with sqlite3.connect(bad / JOURNAL) as journal:
         journal.execute("UPDATE flights SET outcome = 'timeout', digest = ''")
+    for run in (good, bad):
+        (run / FLIGHTS).mkdir(exist_ok=True)
+        for key in harness.load_results(good)["key"]:
+            (run / FLIGHTS / f"{key}.rrd").write_text(run.name)
     for order in ([good, bad], [bad, good]):
         to = tmp_path / order[0].name / "merged"
         assert merge(order, to).flights == 2
         assert set(harness.load_results(to)["outcome"]) == {"completed"}
+        assert {path.read_text() for path in (to / FLIGHTS).iterdir()} == {"good"}
 
 
 def test_what_is_no_part_of_the_same_experiment_is_refused_and_nothing_is_left(file: Path, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Tables on a terminal and in Markdown."""
 
+import math
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -78,7 +79,16 @@ def test_markdown_has_the_same_cells() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(None, "-"), (True, "yes"), (False, "no"), (0.00049, "0"), (-12.345, "-12.3"), (1234.5, "1.23e+03"), (0, "0")],
+    [
+        (None, "-"),
+        (math.nan, "-"),
+        (True, "yes"),
+        (False, "no"),
+        (0.00049, "0"),
+        (-12.345, "-12.3"),
+        (1234.5, "1.23e+03"),
+        (0, "0"),
+    ],
 )
 def test_a_number_has_three_digits(value: float | bool | None, text: str) -> None:
     assert number(value) == text

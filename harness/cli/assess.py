@@ -80,8 +80,6 @@ def assess(
         raise BadInput(f"--airframe: {error}") from None
     found = assessed(whole, begin, end)
     model = None if model_of is None else beside(found, model_of)
-    if fit is not None:
-        write_text(fit, fitted_plant.document(found))
     if rrd is not None:
         from harness.recorded.recording import write_recording_of
 
@@ -95,12 +93,14 @@ def assess(
         if model:
             told["model"] = {"airframe": model.airframe, "ended": model.ended, **said.as_json(model.assessment)}
         click.echo(json.dumps(told, indent=2))
-        return
-    for line in (*contents.contents(flight), "", *said.lines(found)):
-        click.echo(line)
-    if model:
-        for line in ("", *said.beside_lines(found, model)):
+    else:
+        for line in (*contents.contents(flight), "", *said.lines(found)):
             click.echo(line)
-    if fit:
+        if model:
+            for line in ("", *said.beside_lines(found, model)):
+                click.echo(line)
+    if fit is not None:  # last: a refusal loses nothing of the above
+        write_text(fit, fitted_plant.document(found))
+    if fit and not as_json:
         plants = "plants lagged and coordinated" if read(fit)[0].bank else "plant lagged"
         click.echo(f"\naircraft = {json.dumps(str(fit))}: for the {plants}")

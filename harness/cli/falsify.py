@@ -180,10 +180,9 @@ def _print_found(search: Falsification, counterexample: Path | None) -> None:
         click.echo(f"{search.guide.plant} {broken if search.guide.knows else f'has no {name}, so it was no guide'}")
     bound = search.bound
     failed = f", and {bound.failed} failed and count as broken" if bound.failed else ""
-    click.echo(
-        f"{bound.broken} of {counted(bound.trials, 'uniform trial')} broke it{failed}: with 95 % confidence at most "
-        f"{bound.share:.2%} of the ranges does"
-    )
+    drawn = f"{bound.broken} of {counted(bound.trials, 'uniform trial')} broke it{failed}"
+    share = f"at most {100.0 * bound.share:.3g} %" if bound.share < 1.0 else "any share"
+    click.echo(f"{drawn}: with 95 % confidence {share} of the settings in the ranges that can be flown")
     if counterexample:
         click.echo(f"next: harness fly {counterexample}, or harness view {counterexample}")
 

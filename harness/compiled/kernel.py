@@ -4,6 +4,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -26,7 +27,7 @@ from harness.compiled import arithmetic as arithmetic_
 '''
 _LOOP = "jit(cache=True, _nrt=False)"  # what it calls inherits this: references to arrays are not counted
 FOLDER = "STANDOFF_HARNESS_CACHE"  # the variable that names the folder of the kernels
-_KEPT = 100  # modules
+_KEPT, _YOUNG = 100, 3600.0  # modules; s: a process may be about to import one that is younger
 
 
 class NotCompiledError(Exception):
@@ -125,8 +126,12 @@ def folder() -> Path:
 
 
 def _clear(folder: Path) -> None:
-    """Keeps the latest modules alone, with what Numba made of them."""
-    by_age = sorted(folder.glob("kernel_*.py"), key=lambda file: file.stat().st_ctime_ns)
-    for old in by_age[:-_KEPT]:
-        for file in [old, *(folder / "__pycache__").glob(f"{old.stem}.*")]:
-            file.unlink(missing_ok=True)
+    """Keeps the modules that were read last, and all of the last hour, with what Numba made of them."""
+    used = {}
+    for file in folder.glob("kernel_*.py"):
+        with suppress(FileNotFoundError):  # another process clears as well
+            used[file] = max(file.stat().st_atime, file.stat().st_ctime)
+    for old in sorted(used, key=used.__getitem__)[:-_KEPT]:
+        if used[old] < time.time() - _YOUNG:
+            for file in [old, *(folder / "__pycache__").glob(f"{old.stem}.*")]:
+                file.unlink(missing_ok=True)

@@ -352,6 +352,13 @@ class _Writer(ast.NodeTransformer):
             return ast.Call(_arithmetic("power"), [node.left, node.right], [])
         return node
 
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        """`x **= y` as `x = x ** y`."""
+        if isinstance(node.op, ast.Pow) and isinstance(node.target, ast.Name):
+            return ast.Assign([node.target], self.visit(ast.BinOp(_name(node.target.id), node.op, node.value)))
+        self.generic_visit(node)
+        return node
+
     def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
         self.generic_visit(node)
         if not any(isinstance(one, ast.Starred) for one in node.elts) or not isinstance(node.ctx, ast.Load):

@@ -122,6 +122,12 @@ def _bank_reserve(signals: Signals) -> float | None:
     return math.degrees(aircraft.limits(aircraft.folder(flight.aircraft)).bank - needed)
 
 
+def _limit_cycle_amplitude(signals: Signals) -> float | None:
+    if signals.limit_cycle:
+        return math.degrees(signals.limit_cycle.heading_rate)
+    return None if signals.chatters is None else 0.0
+
+
 def _averaged(x: Array, samples: float) -> Array:
     """A centred moving average: it delays nothing."""
     window = np.ones(max(1, round(samples)))
@@ -238,7 +244,7 @@ _METRICS = (
     Metric(
         name="overshoot_m",
         unit="m",
-        meaning="largest range error of the opposite sign after the first crossing",
+        meaning="largest range error of the opposite sign after the first crossing; 0 without a crossing",
         measure=lambda signals: overshoot(signals.log["range_error"]),
         heading="overshoot",
         in_short_tables=True,
@@ -284,8 +290,8 @@ _METRICS = (
     Metric(
         name="limit_cycle_amplitude_deg_s",
         unit="deg/s",
-        meaning="half of peak to peak of the flown heading rate in that limit cycle",
-        measure=lambda signals: math.degrees(signals.limit_cycle.heading_rate) if signals.limit_cycle else None,
+        meaning="half of peak to peak of the flown heading rate in that limit cycle; 0 without one",
+        measure=_limit_cycle_amplitude,
         heading="limit cycle",
         statistic="amplitude",
         of_circling=True,

@@ -175,7 +175,9 @@ class SixDof:
         fdm = load(self.airframe, self.step, self.errors)
         if adopted := aircraft.adopted(self.airframe):
             self._engage_adopted(fdm, adopted, start, air)
-            return SixDofFlying(fdm, self.step, start, air, limits.stall, _stepper(fdm, air))
+            stepper = _stepper(fdm, air)
+            stepper(1, lambda: None)  # the air at the start: the first step flies to the next
+            return SixDofFlying(fdm, self.step, start, air, limits.stall, stepper)
         try:
             trimmed = trim(fdm, start, air)
         except NoTrimError as error:

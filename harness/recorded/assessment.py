@@ -273,7 +273,7 @@ def _worded(made: "dict[str, _Made | CannotJudgeError]", limits: dict[str, float
         elif word is Verdict.UNDECIDED:
             level = limits["significance"] / max(1, sum(test.can_err for test in tests.values()))
             needed = seeds_to_decide(sample, *bounds, level)
-            reason = "; ".join(filter(None, [reason, "the interval crosses the margin"]))
+            reason = "; ".join(filter(None, [reason, sample.why_not or "the interval crosses the margin"]))
         yield PartFinding(part, word, reason, sample.mean, low, high, sample.seeds, needed, bounds)
 
 

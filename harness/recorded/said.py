@@ -42,7 +42,7 @@ def lines(found: Assessment) -> Iterator[str]:
 def row(finding: PartFinding) -> list[str]:
     """The cells below `HEADINGS`."""
     bound = _is_bound(finding)
-    interval = "" if bound else f"{number(finding.low)} to {number(finding.high)}"
+    interval = "" if bound or math.isnan(finding.low) else f"{number(finding.low)} to {number(finding.high)}"
     reason = finding.reason
     if finding.needed:
         reason = f"{reason}: {finding.needed} windows like these would decide"

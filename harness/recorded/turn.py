@@ -46,7 +46,7 @@ class TurnRelation(NamedTuple):
 
 
 class Integrals(NamedTuple):
-    """On a fine grid: the time, tan(bank), and the airspeed's place."""
+    """The time, s, and the tangent of the bank on a fine grid."""
 
     time: Array
     tangent: Array

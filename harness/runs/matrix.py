@@ -272,12 +272,14 @@ def _exclusion(
     mistakes: list[str],
     mistaken: Collection[str],
 ) -> Mapping[str, object]:
-    """The values of an exclusion by key; empty if a key has a mistake or is given by `--set`."""
+    """The values of an exclusion by key, without what `--set` gives all flights; empty if it excludes none of them."""
     choices = {key: values for a in block.axes for key, values in a.choices().items()}
     checked = {}
     for key, name, value in flattened(table):
         place = f"{file.path}:{_line(file, (*at, *key))}: exclude.{name}"
         if name not in choices:
+            if _is_fixed(name, fixed) and _of_all(file, name) == value:
+                continue
             if name in mistaken or _is_fixed(name, fixed):
                 return {}
             known = ", ".join(sorted(choices)) or "none"
@@ -294,6 +296,14 @@ def _is_fixed(name: str, fixed: Sequence[Key]) -> bool:
     """Whether `--set` gives this key or a table that contains it."""
     words = tuple(name.split("."))
     return any(words[: len(key)] == key for key in fixed)
+
+
+def _of_all(file: SettingsFile, name: str) -> object:
+    """The value of a key in [flight]; None where it has none."""
+    value: object = _table(file.document, "flight")
+    for word in name.split("."):
+        value = value.get(word) if isinstance(value, Mapping) else None
+    return value
 
 
 def _line(file: SettingsFile, key: Key, element: int | None = None) -> int:

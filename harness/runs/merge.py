@@ -38,7 +38,7 @@ def merge(folders: Sequence[Path], to: Path) -> Merged:
     try:
         make_folder(partial)
         merged = _journal(folders, partial / JOURNAL)
-        for path in _recordings(folders):
+        for path in _recordings(folders, partial):
             (partial / FLIGHTS).mkdir(exist_ok=True)
             if not (partial / FLIGHTS / path.name).exists():
                 shutil.copy2(path, partial / FLIGHTS)
@@ -102,9 +102,19 @@ def _copy(journal: sqlite3.Connection, other: sqlite3.Connection, verb: str, tab
     journal.executemany(f"{verb} INTO {table} VALUES ({', '.join('?' * len(found.description))})", found)
 
 
-def _recordings(folders: Sequence[Path]) -> Iterator[Path]:
+def _recordings(folders: Sequence[Path], merged: Path) -> Iterator[Path]:
+    """The recordings of the rows that are kept, by their digests, where several runs flew a flight."""
+    kept = _digests(merged)
     for folder in folders:
-        yield from sorted((folder / FLIGHTS).glob("*.rrd"))
+        own = _digests(folder)
+        for path in sorted((folder / FLIGHTS).glob("*.rrd")):
+            if path.stem in own and own[path.stem] == kept[path.stem]:
+                yield path
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    with reading(folder) as journal:
+        return dict(journal.execute("SELECT key, digest FROM flights"))
 
 
 def told(merged: Merged) -> Iterator[str]:

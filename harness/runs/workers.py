@@ -274,7 +274,8 @@ class _Flying:
             if isinstance(answer, str):
                 yield _failed(task, Outcome.INVALID, answer)
             else:
-                self.wall_time.learn(task.flight, answer.result.seconds or 0.0)
+                if answer.result.seconds is not None:
+                    self.wall_time.learn(task.flight, answer.result.seconds)
                 yield Done(task, answer)
 
     def _lost(self, chunk: _Chunk, error: BaseException) -> Iterator[Done]:

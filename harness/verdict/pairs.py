@@ -98,7 +98,7 @@ def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
             table[name] = number.where(~lost)
         else:
             table[name] = np.nan
-    table["overshoot_m"] = table["overshoot_m"].fillna(0.0).where(~lost)  # an error without a change of sign
+    table["overshoot_m"] = table["overshoot_m"].fillna(0.0).where(~lost)  # rows of metrics before 7
     table["lost"] = lost.astype(float)
     table["converged"] = (table["convergence_time_s"].notna() & ~lost).astype(float)
     astray = (table["goes_round"] == 0.0) | lost  # rows older than this metric do not say

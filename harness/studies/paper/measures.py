@@ -98,4 +98,4 @@ def rms(log: Trace, begin: float = 0.0) -> float:
 
 def overshoot(log: Trace, until: float = math.inf) -> float:
     """The largest r of the opposite sign after the first crossing, m."""
-    return series.overshoot(log["range_error"][log["time"] <= until]) or 0.0
+    return series.overshoot(log["range_error"][log["time"] <= until])
