@@ -164,7 +164,7 @@ def block(pairs: int, seeds: int) -> Iterator[str]:
     yield ""
     rows = {"alone": ["a flight", "45 to 80"], "metrics": ["a flight with its metrics", "20"]}
     times, library = ["a compiled flight, ms", ""], ["of it calls of the C library, ms", ""]
-    bounds = ["a flight of calls of the C library alone", ""]
+    bounds = ["calls of the C library alone", ""]
     for plant in PLANTS:
         flight = replace(FLIGHT, plant=plant)
         assert not engine.why_plain(flight)

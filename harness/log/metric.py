@@ -83,7 +83,7 @@ def window_in_words(metrics: Mapping[str, Value]) -> str:
         left = metrics["convergence_time_s"] is not None
         which = f"the last half, since {'the circle cannot be held' if left else 'the flight did not converge'}"
     elif not laps:
-        which = "what is left after convergence, less than a lap"
+        which = "what is left after convergence, less than a lap, with the end of the approach in it"
     else:
         which = "the last whole lap" if laps == 1 else f"the last {laps:g} whole laps"
     return f"Circling is judged from {begin:g} s to {end:g} s: {which}."
