@@ -1,6 +1,7 @@
 """Checks of a flight that involve more than one field: time steps, wind, target, airframe."""
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -38,7 +39,7 @@ def start_problems(flight: Flight) -> list[Problem]:
 
     A model of somebody else may end the process that loads it, so this is tried in a child.
     """
-    if _airframe_problems(flight):
+    if list(_airframe_problems(flight)):
         return []
     plant, start, wind = plant_of(flight), flight.start, flight.wind.steady
     if (model := model_of_another(flight)) is None:
@@ -87,54 +88,67 @@ def _cannot_start_apart(
 
 def problems(flight: Flight) -> list[Problem]:
     """All mistakes that involve more than one field; empty for a flight that can be simulated."""
-    mistakes = []
-    for name, period, unit_name, unit in (
-        ("guidance_period", flight.guidance_period, "step", flight.step),
-        ("duration", flight.duration, "guidance_period", flight.guidance_period),
-    ):
-        if not _is_multiple(period, unit):
-            not_multiple = f"{period:g} s is not a whole multiple of {unit_name}_s, {unit:g} s"
-            mistakes.append(Problem(name, not_multiple, (unit_name,)))
-            break
-    for what, field, period, most in (
-        ("guidance periods", "guidance_period", flight.guidance_period, MOST_PERIODS),
-        ("steps", "step", flight.step, MOST_STEPS),
-    ):
-        if not mistakes and flight.duration / period > most:
-            many = f"takes {flight.duration / period:.3g} {what} of {period:g} s, must be {most:g} at most"
-            mistakes.append(Problem("duration", many, (field,)))
-    sample, guidance = flight.estimator.period, flight.guidance_period
-    if flight.estimator.filters:
-        if not _is_multiple(sample, flight.step):
-            not_multiple = f"{sample:g} s is not a whole multiple of step_s, {flight.step:g} s"
-            mistakes.append(Problem("estimator.period", not_multiple, ("estimator.kind", "step")))
-        elif not (_is_multiple(sample, guidance) or _is_multiple(guidance, sample)):
-            neither = (
-                f"{sample:g} s is neither a whole multiple nor a whole fraction of guidance_period_s, {guidance:g} s"
-            )
-            mistakes.append(Problem("estimator.period", neither, ("estimator.kind", "guidance_period")))
-    if flight.errors.command_delay and not _is_multiple(flight.errors.command_delay, flight.step):
-        not_multiple = f"{flight.errors.command_delay:g} s is not a whole multiple of step_s, {flight.step:g} s"
-        mistakes.append(Problem("errors.command_delay", not_multiple, ("step",)))
-    if 0.0 < flight.errors.actuator_lag < 0.5 * flight.step:
-        quick = f"{flight.errors.actuator_lag:g} s is too quick for steps of {flight.step:g} s: 0 or half a step"
-        mistakes.append(Problem("errors.actuator_lag", quick, ("step",)))
-    speed = math.hypot(*flight.wind.steady)
-    if speed >= flight.start.airspeed:
-        strong = f"wind of {speed:g} m/s, must be below the airspeed, {flight.start.airspeed:g} m/s"
-        mistakes.append(Problem("wind.steady", strong, ("start.airspeed",)))
-    mistakes += [
-        Problem(f"wind.gusts.{i}.to", f"{gust.to:g} s, must be after from_s, {gust.from_:g} s")
-        for i, gust in enumerate(flight.wind.gusts)
-        if gust.to <= gust.from_
+    return [
+        *_period_problems(flight),
+        *_estimator_problems(flight),
+        *_error_problems(flight),
+        *_wind_problems(flight),
+        *_target_problems(flight),
+        *_airframe_problems(flight),
     ]
-    altitude = flight.start.altitude
-    if flight.wind.turbulence != "none" and not LOWEST <= altitude <= HIGHEST:
+
+
+def _period_problems(flight: Flight) -> Iterator[Problem]:
+    """Of the steps, the guidance periods and the duration: a multiple each of the one before, and not too many."""
+    step, period, duration = flight.step, flight.guidance_period, flight.duration
+    if not _is_multiple(period, step):
+        yield Problem("guidance_period", _no_multiple(period, "step_s", step), ("step",))
+        return
+    if not _is_multiple(duration, period):
+        yield Problem("duration", _no_multiple(duration, "guidance_period_s", period), ("guidance_period",))
+        return
+    for what, field, length, most in (
+        ("guidance periods", "guidance_period", period, MOST_PERIODS),
+        ("steps", "step", step, MOST_STEPS),
+    ):
+        if duration / length > most:
+            many = f"takes {duration / length:.3g} {what} of {length:g} s, must be {most:g} at most"
+            yield Problem("duration", many, (field,))
+            return
+
+
+def _estimator_problems(flight: Flight) -> Iterator[Problem]:
+    sample, guidance, step = flight.estimator.period, flight.guidance_period, flight.step
+    if not flight.estimator.filters:
+        return
+    if not _is_multiple(sample, step):
+        yield Problem("estimator.period", _no_multiple(sample, "step_s", step), ("estimator.kind", "step"))
+    elif not (_is_multiple(sample, guidance) or _is_multiple(guidance, sample)):
+        neither = f"{sample:g} s is neither a whole multiple nor a whole fraction of guidance_period_s, {guidance:g} s"
+        yield Problem("estimator.period", neither, ("estimator.kind", "guidance_period"))
+
+
+def _error_problems(flight: Flight) -> Iterator[Problem]:
+    delay, lag, step = flight.errors.command_delay, flight.errors.actuator_lag, flight.step
+    if delay and not _is_multiple(delay, step):
+        yield Problem("errors.command_delay", _no_multiple(delay, "step_s", step), ("step",))
+    if 0.0 < lag < 0.5 * step:
+        quick = f"{lag:g} s is too quick for steps of {step:g} s: 0 or half a step"
+        yield Problem("errors.actuator_lag", quick, ("step",))
+
+
+def _wind_problems(flight: Flight) -> Iterator[Problem]:
+    wind, airspeed, altitude = flight.wind, flight.start.airspeed, flight.start.altitude
+    speed = math.hypot(*wind.steady)
+    if speed >= airspeed:
+        strong = f"wind of {speed:g} m/s, must be below the airspeed, {airspeed:g} m/s"
+        yield Problem("wind.steady", strong, ("start.airspeed",))
+    for i, gust in enumerate(wind.gusts):
+        if gust.to <= gust.from_:
+            yield Problem(f"wind.gusts.{i}.to", f"{gust.to:g} s, must be after from_s, {gust.from_:g} s")
+    if wind.turbulence != "none" and not LOWEST <= altitude <= HIGHEST:
         holds = f"the low-altitude model holds from {LOWEST:g} to {HIGHEST:g} m; the flight starts at {altitude:g} m"
-        mistakes.append(Problem("wind.turbulence", holds, ("start.altitude",)))
-    mistakes += _target_problems(flight)
-    mistakes += _airframe_problems(flight)
-    return mistakes
+        yield Problem("wind.turbulence", holds, ("start.altitude",))
 
 
 def airframe_of(name: str) -> Path:
@@ -159,47 +173,50 @@ def airframe_of(name: str) -> Path:
     return airframe
 
 
-def _airframe_problems(flight: Flight) -> list[Problem]:
+def _airframe_problems(flight: Flight) -> Iterator[Problem]:
     try:
         airframe_of(flight.aircraft)
     except ValueError as error:
-        return [Problem("aircraft", str(error))]
+        yield Problem("aircraft", str(error))
+        return
     try:
         plant_of(flight)
     except PlantError as error:
-        return [Problem(error.key, str(error), _OF_PLANT)]
-    return []
+        yield Problem(error.key, str(error), _OF_PLANT)
 
 
-def _target_problems(flight: Flight) -> list[Problem]:
+def _target_problems(flight: Flight) -> Iterator[Problem]:
     target = flight.target
     if target.track is not None:
-        default = Target()
-        mistakes = [
-            Problem(
-                f"target.{name}", "is set beside a track, which alone defines the motion of the target: leave it out"
-            )
-            for name in ("position", "speed", "heading", "segments")
-            if getattr(target, name) != getattr(default, name)
-        ]
-        try:
-            end = load_track(Path(target.track)).end
-        except TrackError as error:
-            return [*mistakes, Problem("target.track", str(error))]
-        if flight.duration > end * (1.0 + 1e-9):
-            ends = f"{target.track} ends at {end:g} s, must last as long as duration_s, {flight.duration:g} s"
-            mistakes.append(Problem("target.track", ends, ("duration",)))
-        return mistakes
-    mistakes = [
-        Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
-        for i, segment in enumerate(target.segments)
-        if segment.to <= segment.from_
-    ]
+        yield from _track_problems(flight, Path(target.track))
+        return
+    for i, segment in enumerate(target.segments):
+        if segment.to <= segment.from_:
+            yield Problem(f"target.segments.{i}.to", f"{segment.to:g} s, must be after from_s, {segment.from_:g} s")
     slowest = min(leg.speed for leg in target.legs())
     if slowest < -1e-9:
         slow = f"slow the target down to {slowest:g} m/s, must keep its speed at or above 0"
-        mistakes.append(Problem("target.segments", slow, ("target.speed",)))
-    return mistakes
+        yield Problem("target.segments", slow, ("target.speed",))
+
+
+def _track_problems(flight: Flight, track: Path) -> Iterator[Problem]:
+    default = Target()
+    for name in ("position", "speed", "heading", "segments"):
+        if getattr(flight.target, name) != getattr(default, name):
+            beside = "is set beside a track, which alone defines the motion of the target: leave it out"
+            yield Problem(f"target.{name}", beside)
+    try:
+        end = load_track(track).end
+    except TrackError as error:
+        yield Problem("target.track", str(error))
+        return
+    if flight.duration > end * (1.0 + 1e-9):
+        ends = f"{flight.target.track} ends at {end:g} s, must last as long as duration_s, {flight.duration:g} s"
+        yield Problem("target.track", ends, ("duration",))
+
+
+def _no_multiple(period: float, unit_name: str, unit: float) -> str:
+    return f"{period:g} s is not a whole multiple of {unit_name}, {unit:g} s"
 
 
 def _is_multiple(period: float, unit: float) -> bool:
