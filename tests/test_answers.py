@@ -19,7 +19,7 @@ from harness.studies.does_it_hold import (
     short_answer,
     still_air,
 )
-from harness.verdict.answer import plain
+from harness.verdict.answer import plain, share
 from harness.verdict.comparison import Comparison
 from tests.builders import DOCS, ROOT
 
@@ -84,19 +84,16 @@ def test_what_would_make_it_hold_follows_from_the_flights(gains: list[Gains], pa
     assert len(gains) == 3 * 3  # airframes, pairs of gains
     for each in gains:
         time = number(each.costs["convergence_time_s"])
-        assert (
-            f"| {each.cycling} of {each.of} | {each.converged[0]}, {each.converged[1]} of {each.seeds} | {time} |"
-            in page
-        )
+        assert f"| {share(each.cycle)} | {each.converged[0]}, {each.converged[1]} of {each.seeds} | {time} |" in page
 
 
 def test_with_a_margin_of_one_and_a_half_no_flight_is_in_a_limit_cycle(gains: list[Gains]) -> None:
     asked = Assess().limit_cycle_margin
     with_margin = [each for each in gains if each.margin >= asked]
     assert {each.aircraft for each in with_margin} == {each.aircraft for each in gains}
-    assert all(each.of == each.seeds for each in with_margin)
-    assert sum(each.cycling for each in with_margin) == 0
-    assert all(each.cycling == each.of for each in gains if each.margin < 1.0)
+    assert all(each.cycle.of == each.seeds for each in with_margin)
+    assert sum(each.cycle.number for each in with_margin) == 0
+    assert all(each.cycle.share == 1.0 for each in gains if each.margin < 1.0)
 
 
 # What was said before, and what the flights say

@@ -72,6 +72,18 @@ def test_the_interval_of_a_share_holds_the_truth_also_where_every_flight_agrees(
     assert np.mean(holds) >= 0.95
 
 
+@pytest.mark.parametrize(("apart", "seeds"), [(0.4, 20), (0.3, 20), (0.25, 40)])
+def test_the_interval_of_a_share_holds_the_truth_where_the_plants_often_disagree(apart: float, seeds: int) -> None:
+    """As often the one way as the other: the two shares exclude each other, and are known from the same seeds."""
+    draws, holds, further = np.random.default_rng(9), [], 4000
+    for _ in range(2000):
+        u = draws.random(seeds)
+        y, x = u < 0.5, (u < 0.5 - apart) | (u >= 1.0 - apart)
+        found = share_with(y.astype(float), x.astype(float), (np.arange(further) % 2).astype(float)).reduced
+        holds.append(found.low <= 0.5 <= found.high)
+    assert np.mean(holds) >= 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / 2000)
+
+
 def flights(further: int = 60, agree: float = 0.98, common: int = 20) -> pd.DataFrame:
     """Some seeds on both plants and further ones on the kinematic one; one metric goes together on them."""
     draws = np.random.default_rng(8)

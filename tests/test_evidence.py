@@ -13,6 +13,7 @@ from harness.studies.statistics import (
     Design,
     conditions,
     coverage,
+    shares,
     words,
 )
 
@@ -40,6 +41,12 @@ def test_at_most_one_family_in_twenty_has_a_false_word(seeds: int) -> None:
         assert each.false_families <= MOST_WRONG + slack(MOST_WRONG), each
         if seeds == 12 and each.truth == "well inside":
             assert each.decided > 0.4, each  # it is not honest by never deciding
+
+
+def test_at_most_one_family_in_twenty_has_a_false_word_for_a_share_of_flights() -> None:
+    for cells, seeds, replications in ((1, 72, REPLICATIONS), (12, 20, 100)):
+        for each in shares(cells, (seeds,), replications, (1.001,)):
+            assert each.false_families <= MOST_WRONG + slack(MOST_WRONG), each
 
 
 @pytest.mark.parametrize("design", DESIGNS, ids=lambda design: design.name)

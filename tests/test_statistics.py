@@ -65,11 +65,64 @@ def test_too_few_seeds_have_no_interval_and_say_how_many_are_needed() -> None:
 def test_what_is_not_drawn_is_a_number_and_what_is_drawn_needs_fourteen_that_agree() -> None:
     exact = Sample(np.array([1.5]), 1, drawn=False)
     assert exact.interval() == (1.5, 1.5)
-    assert evidence(exact, -2.0, 2.0) == (0.0, 1.0)
-    assert evidence(exact, -1.0, 1.0) == (1.0, 0.0)
+    assert evidence(exact, -2.0, 2.0) == (0.0, 1.0, False)
+    assert evidence(exact, -1.0, 1.0) == (1.0, 0.0, False)
     assert drawn(np.full(LEAST_EQUAL - 1, 1.5)).interval() is None
     assert drawn(np.full(LEAST_EQUAL, 1.5)).interval() == (1.5, 1.5)
     assert 1.0 - 0.05 ** (1.0 / LEAST_EQUAL) < 0.2 < 1.0 - 0.05 ** (1.0 / (LEAST_EQUAL - 1))
+
+
+def test_a_share_on_which_all_seeds_agree_has_the_interval_and_the_evidence_of_the_binomial() -> None:
+    for seeds in (1, 5, 20, 72):
+        for value, number in ((0.0, 0), (1.0, seeds)):
+            of = Sample(np.full(seeds, value), seeds, drawn=True, reach=(0.0, 1.0))
+            exact = stats.binomtest(number, seeds, 0.05)
+            expected = exact.proportion_ci(0.95, "exact")
+            assert of.interval() == pytest.approx((expected.low, expected.high))
+            assert not of.why_not
+            assert of.p_below(0.05) == pytest.approx(stats.binom.cdf(number, seeds, 0.05))
+            assert of.p_above(0.05) == pytest.approx(stats.binom.sf(number - 1, seeds, 0.05))
+    flights = sample(np.zeros(72), np.repeat(np.arange(24), 3), drawn=True, reach=(0.0, 1.0))
+    assert flights.interval() == Sample(np.zeros(24), 24, drawn=True, reach=(0.0, 1.0)).interval()  # one seed, one draw
+
+
+def test_no_share_below_a_margin_is_shown_by_fewer_seeds_than_the_binomial_asks() -> None:
+    for level in (0.05, 0.05 / 12.0):
+        of = Sample(np.zeros(20), 20, drawn=True, reach=(-1.0, 1.0))
+        needed = seeds_to_decide(of, -0.05, 0.05, level)
+        assert needed is not None
+        for seeds, decided in ((needed, True), (needed - 1, False)):
+            more = Sample(np.zeros(seeds), seeds, drawn=True, reach=(-1.0, 1.0))
+            assert (evidence(more, -0.05, 0.05).holds <= level) is decided
+    assert seeds_to_decide(of, None, 0.05, 0.05) == 72
+    assert seeds_to_decide(of, None, 0.0, 0.05) is None  # no number of seeds shows that it never happens
+
+
+@pytest.mark.parametrize("other", [0.0, 0.2, 0.45])
+def test_the_evidence_of_seeds_that_agree_is_the_largest_over_all_truths_on_the_bound(other: float) -> None:
+    """Of pairs in which one flight alone has it: a share that has it beyond the other's, both of any size."""
+    bound, seeds = 0.1, 9
+    for value, chance in ((0.0, 1.0 - (bound + other) - other), (1.0, bound + other)):
+        of = Sample(np.full(seeds, value), seeds, drawn=True, reach=(-1.0, 1.0))
+        p = of.p_below(bound) if value < bound else of.p_above(bound)
+        assert p >= chance**seeds - 1e-12
+        assert (p == pytest.approx(chance**seeds)) is (other == (0.0 if value < bound else 0.45))
+
+
+def test_a_share_that_does_not_depend_on_the_seed_is_exact_where_nothing_is_drawn_only() -> None:
+    exact = Sample(np.zeros(1), 1, drawn=False, reach=(0.0, 1.0))
+    assert exact.interval() == (0.0, 0.0)
+    assert evidence(exact, None, 0.05) == (0.0, 1.0, False)
+    few = Sample(np.zeros(5), 5, drawn=True, reach=(0.0, 1.0))
+    assert evidence(few, None, 0.05) == (1.0, 1.0, True)  # it is in the family of tests, whatever it says
+    assert evidence(drawn(np.zeros(5)), None, 0.05) == (1.0, 1.0, False)
+
+
+def test_the_interval_of_a_share_ends_where_a_share_does() -> None:
+    of = Sample(np.array([1.0] + 19 * [0.0]), 20, drawn=True, reach=(0.0, 1.0))
+    low, high = of.interval() or (math.nan, math.nan)
+    assert low == 0.0
+    assert high == (drawn(of.means).interval() or (0.0, 0.0))[1]
 
 
 def test_evidence_is_for_the_side_on_which_the_interval_lies() -> None:

@@ -110,17 +110,74 @@ def test_what_is_set_is_an_axis_and_what_is_drawn_or_follows_is_none() -> None:
 # Words
 
 
+def repeated(flights: pd.DataFrame, times: int) -> pd.DataFrame:
+    """The same flights with so many times the seeds, each with a start of its own."""
+    found = pd.concat(
+        flights.assign(seed=flights["seed"] + i * SEEDS, key=flights["key"] + f"-{i}") for i in range(times)
+    )
+    found["start.heading_deg"] = 30.0 + found["seed"]
+    return found.reset_index(drop=True)
+
+
+def words_of(flights: pd.DataFrame) -> dict[str, Verdict]:
+    card = card_of(flights)
+    return {part.column: card.conclusion(part.column).word for part in card.parts}
+
+
 def test_equal_plants_differ_in_nothing_and_enough_equal_seeds_hold() -> None:
     flights = result_matrix()
-    card = card_of(flights)
-    drawn = [j for j in card.judgements if j.column not in PARTS or PARTS[j.column].drawn]
+    drawn = [j for j in card_of(flights).judgements if j.column not in PARTS or PARTS[j.column].drawn]
     assert {judgement.word for judgement in drawn} == {Verdict.UNDECIDED}  # 12 seeds that agree are too few
-    more = pd.concat([flights, flights.assign(seed=flights["seed"] + SEEDS, key=flights["key"] + "b")])
-    more["start.heading_deg"] = 30.0 + more["seed"]
     assert 2 * SEEDS >= LEAST_EQUAL
-    assert {part.title: card_of(more).conclusion(part.column).word for part in card_of(more).parts} == dict.fromkeys(
-        [part.title for part in card.parts], Verdict.HOLDS
-    )
+    two = words_of(repeated(flights, 2))
+    assert {column for column, word in two.items() if word != HOLD} == {"chatters", "lost", "converged"}
+    assert set(words_of(repeated(flights, 8)).values()) == {HOLD}  # 96 seeds
+
+
+def test_a_share_of_no_flight_is_shown_to_lie_within_its_margin_by_as_many_seeds_as_the_binomial_asks() -> None:
+    """Three such parts are one family: 0.95^94 is below 0.025 / 3, 0.95^93 is not."""
+    for seeds, word in ((93, OPEN), (94, HOLD)):
+        flights = repeated(result_matrix(), 8)
+        words = words_of(flights[flights["seed"] < seeds])
+        assert [words[column] for column in ("chatters", "lost", "converged")] == 3 * [word]
+    two = {j.column: j for j in card_of(repeated(result_matrix(), 2)).judgements}
+    cycle, lost = two["chatters"], two["lost"]
+    assert (cycle.why, cycle.seeds_needed) == ("0 of 24 seeds: at most 14.2 %", 94)
+    assert (lost.why, lost.seeds_needed) == ("0 of 24 seeds differ: at most 14.2 %", 94)
+    assert cycle.low == 0.0
+    assert cycle.high == pytest.approx(1.0 - 0.025 ** (1.0 / 24.0))
+    assert (lost.low, lost.high) == (-cycle.high, cycle.high)
+
+
+def test_a_limit_cycle_in_every_flight_fails_by_the_seeds_that_show_it_and_without_draws_by_one() -> None:
+    flights = result_matrix()
+    flights.loc[flights["plant"] == "sixdof", "chatters"] = 1.0
+    for seeds, word in ((1, OPEN), (3, FAIL)):  # with a margin of 5 %: 2 x 0.05, and 2 x 0.05^3
+        (cycle,) = card_of(flights[flights["seed"] < seeds].assign(**{"wind.turbulence": "light"})).of("chatters")
+        assert cycle.word == word
+    flights["start.heading_deg"] = 30.0
+    (cycle,) = card_of(flights[flights["seed"] == 0]).of("chatters")
+    assert (cycle.word, cycle.low, cycle.high) == (FAIL, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "difference", "use"),
+    [
+        ((None, 0.0), -0.1, 0.0),
+        ((None, 0.0), 0.0, 0.0),
+        ((None, 0.0), 0.1, math.inf),
+        ((-0.0, 0.0), 0.0, 0.0),
+        ((-0.0, 0.0), -0.1, math.inf),
+        ((None, 0.05), -0.1, -2.0),
+        ((-0.05, 0.05), -0.1, 2.0),
+        ((5.0, None), 10.0, 0.5),
+    ],
+)
+def test_a_bound_of_zero_is_used_up_by_what_lies_beyond_it_alone(
+    bounds: tuple[float | None, float | None], difference: float, use: float
+) -> None:
+    judgement = Judgement("lost", "sixdof", {}, 5, 5, 0, 0.0, 0.0, difference, 0.0, 0.0, bounds)
+    assert judgement.use == pytest.approx(use)
 
 
 def test_a_word_needs_evidence_in_its_direction() -> None:

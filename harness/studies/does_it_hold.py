@@ -21,13 +21,15 @@ from harness.studies.command import out_option, run, write
 from harness.studies.which_law import KEEPS, keepers_table
 from harness.template import template
 from harness.verdict.answer import interval, plain, signed, unit_of
+from harness.verdict.answer import share as share_text
 from harness.verdict.comparison import Comparison, Scorecard, compare_flights
 from harness.verdict.conditions import conclude
 from harness.verdict.effects import Disturbed, disturbances
 from harness.verdict.following import with_predicted
 from harness.verdict.judgement import Judgement
-from harness.verdict.pairs import entered
+from harness.verdict.pairs import entered, is_drawn
 from harness.verdict.parts import PARTS, Group, with_shares
+from harness.verdict.statistics import Share, share
 from harness.vocabulary import SIGNS, Verdict
 
 if TYPE_CHECKING:
@@ -128,15 +130,21 @@ def _clauses(card: Scorecard, at: Mapping[str, object], others: list[float]) -> 
 
 
 def _cycle(flown: "pd.DataFrame") -> str:
-    known = flown["chatters"].dropna()
-    cycling = flown[flown["chatters"] == 1.0]
-    if not len(known):
+    of = _cycling(flown)
+    if not of.of:
         return "whether it is in a limit cycle is not known"
-    text = f"in a limit cycle in {len(cycling)} of {len(known)} flights"
-    if len(cycling):
-        hertz, swing = cycling["limit_cycle_hz"].median(), cycling["limit_cycle_amplitude_deg_s"].median()
-        text += f" ({hertz:.2g} Hz, ±{swing:.2g} deg/s)"
-    return text
+    text = f"in a limit cycle in {of.number} of {of.of} flights"
+    if not of.number:
+        return f"{text} (at most {plain(100.0 * of.high)} %)"
+    cycling = flown[flown["chatters"] == 1.0]
+    hertz, swing = cycling["limit_cycle_hz"].median(), cycling["limit_cycle_amplitude_deg_s"].median()
+    return f"{text} ({hertz:.2g} Hz, ±{swing:.2g} deg/s)"
+
+
+def _cycling(flown: "pd.DataFrame") -> Share:
+    """In how many flights a limit cycle shows, of those in which it can be told."""
+    known = flown.dropna(subset="chatters")
+    return share(known["chatters"].to_numpy() == 1.0, known["seed"].to_numpy(), drawn=is_drawn(flown))
 
 
 class Followed(NamedTuple):
@@ -231,8 +239,7 @@ class Gains(NamedTuple):
     k2: float  # 1/s
     k3: float
     margin: float  # to the limit cycle
-    cycling: int
-    of: int
+    cycle: Share  # of the flights in a limit cycle
     converged: list[int]  # flights on each plant
     seeds: int
     costs: Mapping[str, Judgement]  # metric -> its difference, where it is known
@@ -250,8 +257,7 @@ def quieter(comparison: Comparison) -> Iterator[Gains]:
             converged = [int(flown.loc[flown["plant"] == plant, "converged"].sum()) for plant in PLANTS]
             yield Gains(
                 card.aircraft, float(k2), float(flown["law.k3"].iloc[0]), float(aircraft["limit_cycle_margin"].iloc[0]),
-                int((aircraft["chatters"] == 1.0).sum()), int(aircraft["chatters"].notna().sum()),
-                converged, int(aircraft["seed"].nunique()), costs,
+                _cycling(aircraft), converged, int(aircraft["seed"].nunique()), costs,
             )  # fmt: skip
 
 
@@ -264,7 +270,8 @@ def remedy(gains: Iterable[Gains]) -> str:
     times = [each.costs["convergence_time_s"].difference for each in quiet]
     return (
         f"k2 = {plain(least)} /s instead of {plain(most)} leaves "
-        f"{sum(each.cycling for each in quiet)} of {sum(each.of for each in quiet)} flights in a limit cycle, "
+        f"{sum(each.cycle.number for each in quiet)} of {sum(each.cycle.of for each in quiet)} flights in a limit "
+        f"cycle (95 % interval: at most {plain(100.0 * max(each.cycle.high for each in quiet))} % on each airframe), "
         f"a settled error within {plain(max(errors))} m rms of the kinematic one, "
         f"and a convergence {', '.join(map(plain, times))} s later "
         f"({', '.join(each.aircraft for each in quiet)}; n = {quiet[0].seeds} each)."
@@ -328,6 +335,7 @@ def page(
         "gains": pairs_of_gains,
         "remedy": remedy(pairs_of_gains),
         "number": number,
+        "share": share_text,
         "limit": PAPERS_LIMIT,
         "law": MAIN_LAW,
         "quiet": QUIET,

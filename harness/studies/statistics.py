@@ -23,6 +23,7 @@ from harness.template import template
 from harness.verdict.conditions import Conclusion, conclude
 from harness.verdict.judgement import Judgement, judged
 from harness.verdict.pairs import Cell, Pairs
+from harness.verdict.parts import PARTS
 from harness.verdict.statistics import LEAST_SEEDS, Sample
 from harness.vocabulary import Verdict
 from harness.world.randomness import stream
@@ -37,6 +38,7 @@ MOST_WRONG = 0.05  # of the families
 LEAST_FOUND = 0.90  # of the clear conditions
 COLUMN = "range_error_rms_m"  # the part that is planted: a margin on both sides
 MARGIN = Assess().range_error_margin
+REFERENCE: Mapping[str, float] = MappingProxyType({COLUMN: 5.0, "chatters": 0.0, "converged": 1.0})  # the baseline's
 
 
 def _exponential(draws: np.random.Generator, size: tuple[int, ...]) -> Array:
@@ -124,16 +126,49 @@ def words(seeds: int, replications: int = REPLICATIONS, scatters: Sequence[str] 
             yield Words(name, seeds, truth, wrong / replications, decided / (replications * CELLS))
 
 
-def judge(differences: Array, at: Sequence[Mapping[str, object]]) -> list[Judgement]:
+def judge(differences: Array, at: Sequence[Mapping[str, object]], column: str = COLUMN) -> list[Judgement]:
     """The words for one family: a row of differences per cell, a column per seed."""
     cells, seeds = differences.shape
-    reference = pd.DataFrame({COLUMN: np.full(cells * seeds, 5.0), "circles": True})
+    baseline = REFERENCE[column]
+    reference = pd.DataFrame({column: np.full(cells * seeds, baseline), "circles": True})
     other = pd.DataFrame(
-        {COLUMN: 5.0 + differences.ravel(), "seed": np.tile(np.arange(seeds), cells), "lost": 0.0, "circles": True}
+        {column: baseline + differences.ravel(), "seed": np.tile(np.arange(seeds), cells), "lost": 0.0, "circles": True}
     )
     rows = np.arange(cells * seeds).reshape(cells, seeds)
     where = [Cell(place, row, drawn=True) for place, row in zip(at, rows, strict=True)]
-    return judged(Pairs(reference, other, other[:0]), where, [COLUMN], "sixdof", Assess(), assumption=True)
+    return judged(Pairs(reference, other, other[:0]), where, [column], "sixdof", Assess(), assumption=True)
+
+
+class Shares(NamedTuple):
+    """How often a family of cells had a false word for a share of flights, and how many of its words were decided."""
+
+    part: str
+    cells: int
+    truth: float  # the share; of the flights that converge, how much smaller it is than the baseline's
+    seeds: int
+    false_families: float
+    decided: float  # of the cells
+
+
+SHARE_SEEDS = (20, 72, 200)
+SHARE_MARGIN = Assess().chatter_share  # that of the shares that converge is the same
+TRUTHS = (1.001, 0.2)  # times the margin: just outside, and well inside
+
+
+def shares(
+    cells: int, seeds: Sequence[int] = SHARE_SEEDS, replications: int = REPLICATIONS, truths: Sequence[float] = TRUTHS
+) -> Iterator[Shares]:
+    """Families of cells in which this share of the flights is in a limit cycle, or alone does not converge."""
+    at = [{"cell": float(i)} for i in range(cells)]
+    for (column, sign), times, n in product((("chatters", 1.0), ("converged", -1.0)), truths, seeds):
+        draws, truth = stream(n, f"shares {column} {times} {cells}"), times * SHARE_MARGIN
+        false = Verdict.HOLDS if times > 1.0 else Verdict.FAILS
+        wrong, decided = 0, 0
+        for _ in range(replications):
+            judgements = judge(np.where(draws.random((cells, n)) < truth, sign, 0.0), at, column)
+            wrong += any(judgement.word == false for judgement in judgements)
+            decided += sum(judgement.word != Verdict.UNDECIDED for judgement in judgements)
+        yield Shares(PARTS[column].title, cells, truth, n, wrong / replications, decided / (replications * cells))
 
 
 AXES: Mapping[str, Sequence[object]] = MappingProxyType(
@@ -223,6 +258,7 @@ class Proof(NamedTuple):
 
     coverage: list[Coverage]
     words: list[Words]
+    shares: list[Shares]
     conditions: list[Conditions]
 
 
@@ -231,6 +267,7 @@ def prove(replications: int = REPLICATIONS) -> Proof:
     return Proof(
         list(coverage(replications)),
         [word for seeds in (5, 12) for word in words(seeds, replications)],
+        [share for cells in (1, CELLS) for share in shares(cells, replications=replications)],
         [condition for seeds in (8, 12) for condition in conditions(seeds, replications)],
     )
 
@@ -265,11 +302,12 @@ def figure(proof: Proof) -> str:
     help="The folder to write to.",
 )
 def main(out: Path) -> None:
-    """Plant the truth in results 2000 times over, and write OUT/statistics.md and its figure. Takes five minutes."""
+    """Plant the truth in results 2000 times over, and write OUT/statistics.md and its figure. Takes eight minutes."""
     proof = prove()
     page = template("harness.studies", "statistics.md.jinja").render(
         proof=proof, seeds=SEEDS, floors=FLOORS, scatters=list(SCATTERS), replications=REPLICATIONS,
         least_seeds=LEAST_SEEDS, cells=CELLS, most_wrong=MOST_WRONG, least_found=LEAST_FOUND,
+        share_margin=SHARE_MARGIN, share_seeds=SHARE_SEEDS,
     )  # fmt: skip
     write(out, {"statistics.svg": figure(proof), "statistics.md": page + "\n"})
 

@@ -19,8 +19,8 @@ from harness.margins import Assess
 from harness.runs.results import load_results
 from harness.studies.command import out_option, run, write
 from harness.template import template
-from harness.verdict.control_variates import LEAST_SAVED, SHARES, Controlled, reductions
-from harness.verdict.pairs import FAILED, axes, cells, entered, ordered, pairs, shown, spread
+from harness.verdict.control_variates import LEAST_SAVED, Controlled, reductions
+from harness.verdict.pairs import FAILED, SHARES, axes, cells, entered, ordered, pairs, shown, spread
 
 TOGETHER = 20  # seeds on both plants, as in one use of the command
 MOST_LISTED = 12

@@ -5,8 +5,10 @@ is corrected by a coefficient times what the cheap plant's mean of the common se
 estimated from the other seeds alone, so the correction is unbiased. Of a share the coefficient is one: the cheap share,
 plus the flights that only the one has, minus those that only the other has.
 
-Both parts have an interval of their own, and half-widths are added in squares (MOVER: Zou and Donner, *Construction of
-confidence limits about effect measures*, Statistics in Medicine 27, 2008).
+Each part has an interval of its own, and half-widths are added in squares (MOVER: Zou and Donner, *Construction of
+confidence limits about effect measures*, Statistics in Medicine 27, 2008). A flight that only the one plant has is none
+that only the other has, so the more there are of the one the fewer there are of the other: a correlation of two cells
+of a multinomial, which widens the interval of their difference.
 """
 
 import math
@@ -18,27 +20,28 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from harness.log.metric import METRICS, YES_OR_NO
+from harness.log.metric import METRICS
 from harness.plants.ladder import rung
 from harness.tables import number, table
 from harness.verdict.pairs import (
     FAILED,
+    SHARES,
     CompareError,
     Pairs,
     axes,
     cells,
+    is_share,
     ordered,
     pairs,
     settings_of,
     shown,
     spread,
 )
-from harness.verdict.statistics import Array, Sample, sample, share
+from harness.verdict.statistics import Array, Sample, Share, sample, share
 
 LEAST_SAVED = 2.0  # a smaller factor is not worth another number
 LEAST_SEEDS = 12  # on both plants: of fewer the coefficient knows too little
 ALIGNMENT = "lllrrllrr"  # of the columns of `row`
-SHARES = ("lost", "converged")  # beside the metrics that are true or false
 
 
 class Interval(NamedTuple):
@@ -86,10 +89,16 @@ def share_with(y: Array, x: Array, further: Array) -> Controlled:
         share(of, np.arange(len(of)), drawn=True) for of in (y == 1.0, further == 1.0, y > x, x > y)
     )
     mean = its.share + only_y.share - only_x.share
-    below = math.hypot(its.share - its.low, only_y.share - only_y.low, only_x.high - only_x.share)
-    above = math.hypot(its.high - its.share, only_y.high - only_y.share, only_x.share - only_x.low)
+    below = _added(its.share - its.low, only_y.share - only_y.low, only_x.high - only_x.share, only_y, only_x)
+    above = _added(its.high - its.share, only_y.high - only_y.share, only_x.share - only_x.low, only_y, only_x)
     reduced = Interval(*(min(1.0, max(0.0, p)) for p in (mean, mean - below, mean + above)))
     return Controlled(Interval(own.share, own.low, own.high), reduced)
+
+
+def _added(its: float, own: float, other: float, only_y: Share, only_x: Share) -> float:
+    """Half-widths of the cheap share and of two that exclude each other, added in squares with their correlation."""
+    odds = [each.share / (1.0 - each.share) if each.share < 1.0 else 0.0 for each in (only_y, only_x)]
+    return math.sqrt(its * its + own * own + other * other + 2.0 * math.sqrt(math.prod(odds)) * own * other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,8 +279,7 @@ def _reduced(of: Reduced, paired: Pairs, further: pd.DataFrame) -> Reduced:
         if np.isnan(numbers).any():
             return replace(of, why=f"some flights on {plant or of.control} have no such number")
         values.append(sample(numbers, seeds, drawn=True).means)
-    is_share = of.metric in SHARES or (metric is not None and metric.unit == YES_OR_NO)
-    if is_share and all(np.isin(each, (0.0, 1.0)).all() for each in values):
+    if is_share(of.metric) and all(np.isin(each, (0.0, 1.0)).all() for each in values):
         return replace(of, of=share_with(*values))
     found = mean_with(*values)
     return replace(of, why=found) if isinstance(found, str) else replace(of, of=found)

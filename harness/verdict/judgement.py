@@ -3,8 +3,8 @@
 A cell is one combination of all that was set to several values. Its pairs differ in what is drawn from the seed.
 *Holds*: the mean difference is shown to lie within its bounds. *Fails*: it is shown to lie outside. *Undecided*:
 neither is shown. Tests are two-sided, and Holm's adjustment keeps the error of a family of them: all parts and cells of
-one airframe under one value of what is compared. Without a margin a difference is *lower* or *higher* where its 95 %
-interval excludes zero.
+one airframe under one value of what is compared. A share of flights is in it like a number, also where no flight has
+what it is a share of. Without a margin a difference is *lower* or *higher* where its 95 % interval excludes zero.
 
 A flight that ended early counts against its cell and never as data: no part *holds* in a cell that loses a larger share
 of its flights than `lost_share`.
@@ -18,9 +18,20 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.margins import Assess
-from harness.verdict.pairs import Cell, Pairs
+from harness.tables import number
+from harness.verdict.pairs import Cell, Pairs, is_share
 from harness.verdict.parts import PARTS, Bounds, Part, margins_of
-from harness.verdict.statistics import LEAST_SEEDS, Array, Evidence, Sample, evidence, holm, sample, seeds_to_decide
+from harness.verdict.statistics import (
+    ANYWHERE,
+    LEAST_SEEDS,
+    Array,
+    Evidence,
+    Sample,
+    evidence,
+    holm,
+    sample,
+    seeds_to_decide,
+)
 from harness.vocabulary import Verdict
 
 LOWER, HIGHER = "lower", "higher"  # without a margin
@@ -57,7 +68,10 @@ class Judgement:
         if low is not None and high is None:  # a reserve is asked
             return low / self.difference if self.difference > 0 else np.inf
         used = [self.difference / bound for bound in (low, high) if bound]
-        return max(used) if used else (0.0 if self.difference == 0 else np.inf)
+        if used:
+            return max(used)
+        is_within = self.difference <= 0.0 and (low is None or self.difference >= 0.0)  # a bound of 0 is all or nothing
+        return 0.0 if is_within else np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +105,23 @@ def judged(
             here = differences[cell.rows]
             if np.isnan(here).all():
                 continue
-            of = sample(here, pairs.seeds[cell.rows], drawn=cell.drawn and (part is None or part.drawn))
+            drawn = cell.drawn and (part is None or part.drawn)
+            of = sample(here, pairs.seeds[cell.rows], drawn=drawn, reach=_reach(column, part))
             if part:
                 tested.append(_tested(part, pairs, cell, value, of, here, margins))
             else:
                 plain.append(_without_margin(_judgement(column, pairs, cell, value, of, here, (None, None)), of))
     return [*_decided(tested, margins), *plain]
+
+
+def _reach(column: str, part: Part | None) -> tuple[float, float]:
+    """From where to where a flight may change a share of flights; a number may change to anywhere.
+
+    A flight has it or not; beside one of the baseline it may have it in addition, or lack it.
+    """
+    if not is_share(column):
+        return ANYWHERE
+    return (-1.0, 1.0) if part is None or part.assumed is None else (0.0 - part.assumed, 1.0 - part.assumed)
 
 
 def _tested(
@@ -121,10 +146,7 @@ def _tested(
         if first or second:
             barred = f"in {first} pairs only the reference converges, in {second} only the other"
     judgement = _judgement(part.column, pairs, cell, value, of, differences, bounds)
-    shown = evidence(of, lows, highs)
-    if part.is_share and high is not None and of.drawn and of.seeds and bool(np.all(of.means == 1.0)):
-        shown = Evidence(1.0, min(1.0, 2.0 * high**of.seeds))  # binomial: every seed has it, where a share may at most
-    return _Tested(judgement, of, shown, barred)
+    return _Tested(judgement, of, evidence(of, lows, highs), barred)
 
 
 def _by_seed(reference: Array, differences: Array, seeds: NDArray[np.generic]) -> Array:
@@ -138,7 +160,7 @@ def _without_margin(judgement: Judgement, of: Sample) -> Judgement:
         return replace(judgement, why=of.why_not)
     if interval[0] > 0.0 or interval[1] < 0.0:
         return replace(judgement, word=HIGHER if interval[0] > 0.0 else LOWER)
-    return replace(judgement, why="the interval includes zero" if of.varies else "no difference")
+    return replace(judgement, why="the interval includes zero" if of.varies or of.mean else "no difference")
 
 
 def _judgement(
@@ -185,11 +207,22 @@ def _decided(tested: Sequence[_Tested], margins: Mapping[str, float]) -> Iterato
         if not each.barred:
             needed = _needed(each, significance / max(1, family))
             why = why or (
-                "the interval crosses the margin"
+                _open(each.sample)
                 if each.evidence.strongest > significance
                 else f"shown as the only test, not as one of this airframe's {family}"
             )
         yield replace(each.judgement, why=why, seeds_needed=needed)
+
+
+def _open(of: Sample) -> str:
+    """Why a test shows neither word, were it the only one."""
+    low, high = of.interval() or (np.nan, np.nan)
+    if not of.is_unanimous:
+        return "the interval crosses the margin"
+    if of.mean:
+        return f"all {of.seeds} seeds agree: {number(low, 100.0)} to {number(high, 100.0)} %"
+    differ = " differ" if low < 0.0 else ""
+    return f"0 of {of.seeds} seeds{differ}: at most {number(high, 100.0)} %"
 
 
 def _needed(each: _Tested, level: float) -> int | None:

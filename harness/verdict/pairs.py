@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.error import HarnessError
-from harness.log.metric import METRICS
+from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.settings.columns import DIRECTORY, is_setting
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 LOST = tuple(outcome.value for outcome in Outcome if outcome.lost)
 FAILED = tuple(outcome.value for outcome in Outcome if outcome.failed)
 SEVERITY = tuple(SEVERITIES)
+SHARES = ("lost", "converged")  # of flights, beside the metrics that are true or false
 UNDISTURBED: Mapping[str, object] = MappingProxyType(  # by the columns of `spread`
     {"wind_speed_mps": 0.0, "wind.turbulence": "none", "estimator.kind": "truth", "law.airspeed": "nominal"}
 )
@@ -104,6 +105,11 @@ def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     astray = (table["goes_round"] == 0.0) | lost  # rows older than this metric do not say
     table["circles"] = (table["range_error_rms_m"] <= circling * table["law.standoff_m"]) & ~astray
     return table
+
+
+def is_share(column: str) -> bool:
+    """Whether its mean is a share of flights: of one flight it is 1 or 0."""
+    return column in SHARES or (column in METRICS and METRICS[column].unit == YES_OR_NO)
 
 
 def pairs_by(flights: pd.DataFrame, key: str, baseline: object) -> Pairs:

@@ -35,7 +35,6 @@ class Part:
     assumed: float | None = None  # what the assumption says it is; None: what the baseline flew
     relative: bool = False  # the margin is a share of the baseline's value
     drawn: bool = True  # False: it follows from the settings, whatever the seed
-    is_share: bool = False  # of flights: one that has it is 1, one that has it not is 0
 
     def bounds(self, margins: Mapping[str, float]) -> Bounds:
         """Of the difference, in the column's unit; shares of the baseline's value for a relative one."""
@@ -67,9 +66,9 @@ PARTS: Mapping[str, Part] = {
         Part("margin to the limit cycle", "limit_cycle_margin", "times the gains", "limit_cycle_margin", "at least",
              Group.FOLLOWED, assumed=0.0, drawn=False),
         Part("no limit cycle", "chatters", "of the flights chatter", "chatter_share", "at most",
-             Group.FOLLOWED, assumed=0.0, is_share=True),
+             Group.FOLLOWED, assumed=0.0),
         Part("flights that last", "lost", "of the flights lost", "lost_share", "at most",
-             Group.CONSEQUENCE, is_share=True),
+             Group.CONSEQUENCE),
         Part("convergence", "converged", "of the flights", "convergence_share_margin", "within", Group.CONSEQUENCE),
         Part("convergence time", "convergence_time_s", "s", "convergence_time_margin", "within",
              Group.CONSEQUENCE, relative=True),

@@ -8,6 +8,14 @@ The interval is, on each side, the wider of two: that of Student's T, and that o
 sample. Both take the quantiles of half of the degrees of freedom: a family of tests reaches far into the tails, of
 which few seeds say little. `docs/reference/statistics.md` shows how often the interval holds the truth and how often a
 word is false.
+
+Seeds that all agree have no scatter to make an interval of. Three cases:
+
+- Nothing is drawn: the flights cannot differ, whatever their number, and what one of them says is exact.
+- Something is drawn, and a number comes out the same in `LEAST_EQUAL` seeds: it counts as exact.
+- Something is drawn, and all seeds agree on a share of flights: what it is a share of happened in none of them, or in
+  all. How rare it may then be is a matter of their number, however well the result may be understood: the evidence is
+  the exact binomial one, and its interval that of Clopper and Pearson.
 """
 
 import math
@@ -25,6 +33,7 @@ Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 LEAST_SEEDS = 5  # of fewer draws an interval knows too little of the scatter
 LEAST_EQUAL = 14  # equal draws exclude, at 95 %, that one seed in five differs: 1 - 0.05^(1/14) = 0.19
+ANYWHERE = (-math.inf, math.inf)  # where the mean of a seed may be that is no share
 MOST_SEEDS = 10_000  # beyond it "more seeds" is no advice
 
 
@@ -35,6 +44,7 @@ class Sample:
     means: Array  # one per seed
     pairs: int
     drawn: bool  # something differs between seeds: air, noise, a start
+    reach: tuple[float, float] = ANYWHERE  # the least and the most that a seed may say; finite of a share of flights
 
     @property
     def seeds(self) -> int:
@@ -47,8 +57,14 @@ class Sample:
 
     @property
     def is_exact(self) -> bool:
-        """Nothing is left to chance: nothing was drawn, or enough draws are all equal."""
-        return self.seeds > 0 and not self.varies and (not self.drawn or self.seeds >= LEAST_EQUAL)
+        """Nothing is left to chance: nothing was drawn, or enough draws of a number are all equal."""
+        counts_as_exact = not self.drawn or (self.reach == ANYWHERE and self.seeds >= LEAST_EQUAL)
+        return self.seeds > 0 and not self.varies and counts_as_exact
+
+    @property
+    def is_unanimous(self) -> bool:
+        """A share of drawn flights on which all seeds agree."""
+        return self.drawn and self.reach != ANYWHERE and self.seeds > 0 and not self.varies
 
     @cached_property
     def varies(self) -> bool:
@@ -58,7 +74,7 @@ class Sample:
     @property
     def is_judged(self) -> bool:
         """Whether there is an interval, of no width where the difference is exact."""
-        return self.is_exact or (self.varies and self.seeds >= LEAST_SEEDS)
+        return self.is_exact or self.is_unanimous or (self.varies and self.seeds >= LEAST_SEEDS)
 
     @property
     def why_not(self) -> str:
@@ -77,11 +93,15 @@ class Sample:
             return self.mean, self.mean
         if not self.is_judged:
             return None
+        least, most = self.reach
+        if self.is_unanimous:
+            chance = (0.5 - 0.5 * CONFIDENCE) ** (1.0 / self.seeds)
+            return least + chance * (self.mean - least), most - chance * (most - self.mean)
         T = float(special.stdtrit(self._degrees, 0.5 + 0.5 * CONFIDENCE))
         scale, a = self._scale
         low = max(T, _untransformed(T, a))
         high = min(-T, _untransformed(-T, a))
-        return self.mean - low * scale, self.mean - high * scale
+        return max(least, self.mean - low * scale), min(most, self.mean - high * scale)
 
     def p_above(self, bound: float) -> float:
         """One-sided p-value that the mean is not above the bound: small is evidence that it is."""
@@ -89,6 +109,8 @@ class Sample:
             return 0.0 if self.mean > bound else 1.0
         if not self.is_judged:
             return 1.0
+        if self.is_unanimous:
+            return self.chance(bound) ** self.seeds if self.mean > bound else 1.0
         scale, a = self._scale
         T = (self.mean - bound) / scale
         return float(special.stdtr(self._degrees, -min(T, _transformed(T, a))))
@@ -99,9 +121,19 @@ class Sample:
             return 0.0 if self.mean < bound else 1.0
         if not self.is_judged:
             return 1.0
+        if self.is_unanimous:
+            return self.chance(bound) ** self.seeds if self.mean < bound else 1.0
         scale, a = self._scale
         T = (self.mean - bound) / scale
         return float(special.stdtr(self._degrees, max(T, _transformed(T, a))))
+
+    def chance(self, bound: float) -> float:
+        """The largest chance that one more seed agrees with unanimous ones, were the true mean on the bound.
+
+        All others would then have to be as far beyond the bound as a seed can be. The bound is within `reach`.
+        """
+        end = self.reach[bound > self.mean]
+        return (end - bound) / (end - self.mean) if bound != self.mean else 1.0
 
     def less(self, by: Array) -> "Sample":
         """The sample of what the seeds' means exceed these values by."""
@@ -131,14 +163,20 @@ def _untransformed(y: float, a: float) -> float:
     return 3.0 / a * (math.cbrt(1.0 + a * (y - a / 6.0)) - 1.0) if abs(a) > 1e-9 else y
 
 
-def sample(values: Array, seeds: Sequence[object] | NDArray[np.generic], *, drawn: bool) -> Sample:
+def sample(
+    values: Array,
+    seeds: Sequence[object] | NDArray[np.generic],
+    *,
+    drawn: bool,
+    reach: tuple[float, float] = ANYWHERE,
+) -> Sample:
     """The differences by seed; NaN counts as absent."""
     there = ~np.isnan(values)
     values = values[there]
     if not len(values):
-        return Sample(values, 0, drawn)
+        return Sample(values, 0, drawn, reach)
     _, belongs = np.unique(np.asarray(seeds)[there], return_inverse=True)
-    return Sample(np.bincount(belongs, weights=values) / np.bincount(belongs), len(values), drawn)
+    return Sample(np.bincount(belongs, weights=values) / np.bincount(belongs), len(values), drawn, reach)
 
 
 class Evidence(NamedTuple):
@@ -146,22 +184,18 @@ class Evidence(NamedTuple):
 
     holds: float
     fails: float
+    can_err: bool  # chance is in it: not in what is exact, nor where too few seeds say nothing
 
     @property
     def strongest(self) -> float:
         return min(self.holds, self.fails)
-
-    @property
-    def can_err(self) -> bool:
-        """Whether chance is in it: a number that nothing was drawn for is within its bounds, or outside."""
-        return 0.0 < self.strongest < 1.0
 
 
 def evidence(of: Sample, low: Array | float | None, high: Array | float | None) -> Evidence:
     """Whether the mean lies within the bounds, numbers or one for each seed; None for a bound that is not there."""
     if of.is_exact:  # on the bound itself a number holds
         within = (low is None or of.mean >= np.mean(low)) and (high is None or of.mean <= np.mean(high))
-        return Evidence(0.0, 1.0) if within else Evidence(1.0, 0.0)
+        return Evidence(0.0, 1.0, can_err=False) if within else Evidence(1.0, 0.0, can_err=False)
     inside, outside = [], []
     if low is not None:
         by_seed, bound = (of, low) if isinstance(low, float) else (of.less(low), 0.0)
@@ -171,7 +205,7 @@ def evidence(of: Sample, low: Array | float | None, high: Array | float | None) 
         by_seed, bound = (of, high) if isinstance(high, float) else (of.less(high), 0.0)
         inside.append(by_seed.p_below(bound))
         outside.append(by_seed.p_above(bound))
-    return Evidence(min(1.0, 2.0 * max(inside)), min(1.0, 2.0 * min(outside)))
+    return Evidence(min(1.0, 2.0 * max(inside)), min(1.0, 2.0 * min(outside)), of.is_judged)
 
 
 def holm(p: Sequence[float]) -> list[float]:
@@ -188,9 +222,14 @@ def seeds_to_decide(of: Sample, low: float | None, high: float | None, level: fl
 
     `level` is the two-sided significance that the test has to reach in its family.
     """
+    bounds = [bound for bound in (low, high) if bound is not None]
+    if of.is_unanimous:
+        chance = max(map(of.chance, bounds))
+        needed = math.log(0.5 * level) / math.log(chance) if 0.0 < chance < 1.0 else math.inf
+        return math.ceil(needed) if needed <= MOST_SEEDS else None
     if not of.varies:
         return LEAST_EQUAL if of.seeds < LEAST_EQUAL else None
-    distance = min(abs(of.mean - bound) for bound in (low, high) if bound is not None)
+    distance = min(abs(of.mean - bound) for bound in bounds)
     spread = float(np.std(of.means, ddof=1))
     if of.seeds < 3:
         return LEAST_SEEDS

@@ -47,8 +47,8 @@ def lines(comparison: Comparison, mapped: str | None = None) -> Iterator[str]:
     yield ""
     yield (
         f"Intervals: {100 * CONFIDENCE:.0f} %, of the means of seeds; none below {LEAST_SEEDS} seeds; seeds that all "
-        f"agree count as a number from {LEAST_EQUAL} on. Words: two-sided tests at "
-        f"{comparison.assess.significance:g}, Holm's adjustment over one airframe's parts and cells."
+        f"agree count as exact from {LEAST_EQUAL} on, on a share of flights as so many draws. Words: two-sided tests "
+        f"at {comparison.assess.significance:g}, Holm's adjustment over one airframe's parts and cells."
     )
 
 
