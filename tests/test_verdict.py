@@ -268,11 +268,11 @@ def test_where_the_baseline_does_not_go_round_its_target_the_cost_says_nothing()
 
 
 def test_holm_makes_a_lonely_test_harder_in_company() -> None:
-    alone = shifted(result_matrix(), "range_error_rms_m", 1.4, scatter=0.3)
+    alone = shifted(result_matrix(), "range_error_rms_m", 1.2, scatter=0.3)
     (judgement,) = card_of(alone).of("range_error_rms_m")
     assert judgement.word == Verdict.HOLDS
     many = result_matrix({"guidance_period_s": [0.05 + 0.05 * i for i in range(40)]})
-    many = shifted(shifted(many, "range_error_rms_m", 1.4, scatter=0.3), "sideslip_rms_deg", 1.9, scatter=0.4)
+    many = shifted(shifted(many, "range_error_rms_m", 1.2, scatter=0.3), "sideslip_rms_deg", 1.9, scatter=0.4)
     word = card_of(many).of("range_error_rms_m")[0]
     assert word.word == Verdict.UNDECIDED
     assert "shown as the only test, not as one of" in word.why
