@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from inspect import signature
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from autopilot.response import Response
@@ -67,6 +67,24 @@ def telling(guidance: Guidance, **channels: float) -> Guidance:
 
 
 LawStep = Callable[[Observation], Guidance]
+Memory = TypeVar("Memory", bound=tuple[Any, ...])
+Recalling = Callable[[Observation, Memory], tuple[Guidance, Memory]]
+"""A pure step of a law with memory: from what it sees and remembers to its answer and what it remembers next."""
+
+
+class Remembering(Generic[Memory]):
+    """A law with memory in flight: a `LawStep` that keeps for its pure step what that remembers.
+
+    The memory is a tuple of numbers, or of such tuples, and keeps its shape; so the step can be compiled.
+    """
+
+    def __init__(self, step: Recalling[Memory], memory: Memory) -> None:
+        """`memory` is that at the start."""
+        self.step, self.memory = step, memory
+
+    def __call__(self, o: Observation) -> Guidance:
+        guidance, self.memory = self.step(o, self.memory)
+        return guidance
 
 
 class Context(NamedTuple):

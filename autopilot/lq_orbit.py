@@ -12,7 +12,7 @@ from annotated_types import Ge, Gt, Le
 
 from autopilot.guidance import UNKNOWN, Context, LawStep, Observation
 from autopilot.linear import Array, Linear
-from autopilot.predictor import Feedback, Predictor, faded, model, with_feed_forward
+from autopilot.predictor import Feedback, Predicted, faded, model, predictor, states, with_feed_forward
 from autopilot.quantities import About, Degrees, Seconds
 from autopilot.response import Response, dot
 from autopilot.rules import Known, Rule, rounded
@@ -21,8 +21,8 @@ from autopilot.standoff import (
     Answer,
     StandoffLaw,
     feed_forward_ahead,
-    limited_step,
     relative_motion,
+    remembering_step,
 )
 
 _RESERVED = 0.3  # of the turn rate beyond the circle's, for what the field does not know
@@ -49,22 +49,20 @@ class LqOrbit(StandoffLaw):
         R_d, response = self.standoff, None if context.at_once else context.response
         tau = response.lag if response else 0.0
         k = self.feedback(context)
-        k_states = tuple(k.states.tolist())
+        k_e, k_states, k_w = k.e, tuple(k.states.tolist()), k.disturbance
         field = self._field(k, context.nominal_airspeed)
-        predictor = Predictor(response, context.period, self.smoothing)
+        start, seen, commanded = predictor(response, context.period, self.smoothing)
 
-        def answer(o: Observation, v_a: float, psi_a: float) -> Answer:
+        def answer(o: Observation, v_a: float, psi_a: float, now: Predicted) -> tuple[Answer, Predicted]:
             motion = relative_motion(o, R_d, v_a, psi_a)
             r, _, _, e, _ = motion
-            predictor.seen(e)
+            now = seen(now, e)
+            _, _, _, w, _ = now
             s = e + field(r)
-            rest = -k.e * s - dot(k_states, predictor.states) - k.disturbance * predictor.disturbance
-            return r, s, e, feed_forward_ahead(o, motion, R_d, v_a, psi_a, tau), rest
+            rest = -k_e * s - dot(k_states, states(now)) - k_w * w
+            return (r, s, e, feed_forward_ahead(o, motion, R_d, v_a, psi_a, tau), rest), now
 
-        def applied(command: float, feed_forward: float) -> None:
-            predictor.commanded(command - feed_forward)
-
-        return limited_step(self, answer, applied)
+        return remembering_step(self, answer, commanded, start)
 
     def _field(self, k: Feedback, v_a: float) -> Callable[[float], float]:
         """The angle, rad, at which the circle's tangent is approached from a range error.

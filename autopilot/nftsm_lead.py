@@ -12,10 +12,10 @@ from autopilot import nftsm
 from autopilot.guidance import UNKNOWN, Context, LawStep, Observation
 from autopilot.linear import Linear
 from autopilot.nftsm import Nftsm, reaching
-from autopilot.predictor import Feedback, Predictor, faded, model, with_feed_forward
+from autopilot.predictor import Feedback, Predicted, faded, model, predictor, with_feed_forward
 from autopilot.quantities import About, Seconds
 from autopilot.rules import Known, Rule, rounded
-from autopilot.standoff import Answer, feed_forward_ahead, limited_step, relative_motion, standoff_step
+from autopilot.standoff import Answer, feed_forward_ahead, relative_motion, remembering_step, standoff_step
 
 _QUICKEST = 1.4  # k2 times what a command is late by
 
@@ -43,20 +43,17 @@ class NftsmLead(Nftsm):
             return standoff_step(self, reaching(self))
         R_d, reach, tau = self.standoff, reaching(self), response.lag
         left, carried = faded(tau, self.disturbance_time)
-        predictor = Predictor(response, context.period, self.smoothing)
+        start, seen, commanded = predictor(response, context.period, self.smoothing)
 
-        def answer(o: Observation, v_a: float, psi_a: float) -> Answer:
+        def answer(o: Observation, v_a: float, psi_a: float, now: Predicted) -> tuple[Answer, Predicted]:
             motion = relative_motion(o, R_d, v_a, psi_a)
-            predictor.seen(motion[3])
-            w = predictor.disturbance
-            _, rest, s = reach(relative_motion(o, R_d, v_a, psi_a + predictor.due + carried * w))
+            now = seen(now, motion[3])
+            _, _, d, w, _ = now
+            _, rest, s = reach(relative_motion(o, R_d, v_a, psi_a + d + carried * w))
             feed_forward = feed_forward_ahead(o, motion, R_d, v_a, psi_a, tau)
-            return motion[0], s, motion[3], feed_forward, rest - left * w
+            return (motion[0], s, motion[3], feed_forward, rest - left * w), now
 
-        def applied(command: float, feed_forward: float) -> None:
-            predictor.commanded(command - feed_forward)
-
-        return limited_step(self, answer, applied)
+        return remembering_step(self, answer, commanded, start)
 
     def linearised(self, context: Context, swing: float) -> Linear:
         """From (heading error, range error) to the command beyond the turn of the circle, in still air.

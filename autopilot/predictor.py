@@ -8,8 +8,8 @@ one: e' = G^ u + w, with a disturbance w. What u has commanded and the aircraft 
 is a function of the response's states x alone, so it never drifts, and is zero on the circle, where u is.
 """
 
-from collections import deque
-from math import exp, expm1
+from collections.abc import Callable
+from math import exp, expm1, isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -17,54 +17,67 @@ from numpy.typing import NDArray
 
 from autopilot.angles import wrap
 from autopilot.linear import Array, Linear
-from autopilot.response import Response, dot, held
+from autopilot.response import Response, Rows, dot, held, moved_on
+
+Predicted = tuple[tuple[float, ...], tuple[float, ...], float, float, float]
+"""The response's states x; the commands that still act, oldest first, rad/s; d, rad; w, rad/s; the heading error that
+is expected now, rad, NaN before the first."""
 
 
-class Predictor:
-    """The response to commands held for `period`, s, started at rest: exact at the sampling instants, for any delay.
+class Predictor(NamedTuple):
+    """The response to commands held for a period, as pure functions: exact at the sampling instants, for any delay."""
+
+    start: Predicted  # at rest
+    seen: Callable[[Predicted, float], Predicted]  # with the heading error of this moment, rad
+    commanded: Callable[[Predicted, float], Predicted]  # a period later, with its command u, rad/s
+
+
+def predictor(response: Response | None, period: float, smoothing: float) -> Predictor:
+    """The predictor for commands held for `period`, s.
 
     Without a response the heading rate is its command. The disturbance is the rate of the heading error beyond the
-    response, through a lag of `smoothing`, s. Call `seen` with every heading error, rad, then `commanded` with the
-    command that it led to, rad/s.
+    response, through a lag of `smoothing`, s.
     """
+    periods, rows, turn, due, late = _rows(response, period)
+    after, share = _after(rows, due), -expm1(-period / smoothing) if smoothing else 1.0
 
-    def __init__(self, response: Response | None, period: float, smoothing: float) -> None:
-        periods, self._rows, self._turn, self._due, self._late = _rows(response, period)
-        self._period, self._share = period, -expm1(-period / smoothing) if smoothing else 1.0
-        self._states: tuple[float, ...] = (0.0,) * len(self._rows)
-        self._commands = deque([0.0] * (periods + 1), periods + 1)  # those that still wait, oldest first
-        self._expected: float | None = None
-        self.due = 0.0  # d, rad
-        self.disturbance = 0.0  # w, rad/s
+    def seen(now: Predicted, heading_error: float) -> Predicted:
+        x, commands, d, w, expected = now
+        if not isnan(expected):
+            w += share * (wrap(heading_error - expected) / period - w)
+        return x, commands, d, w, heading_error
 
-    @property
-    def states(self) -> tuple[float, ...]:
-        """The response's states, then the commands that still act, latest first: those of `model`."""
-        return (*self._states, *reversed(self._commands))
+    def commanded(now: Predicted, u: float) -> Predicted:
+        x, commands, _, w, expected = now
+        before, commands = commands[0], (*commands[1:], u)
+        vector = (*x, commands[0], before)
+        x, d = after(vector)
+        waiting = period * (sum(commands) - commands[0]) + late * commands[0]
+        return x, commands, d + waiting, w, expected + dot(turn, vector)
 
-    def seen(self, heading_error: float) -> None:
-        """Takes the heading error of this moment."""
-        if self._expected is not None:
-            rate = wrap(heading_error - self._expected) / self._period
-            self.disturbance += self._share * (rate - self.disturbance)
-        self._expected = heading_error
-
-    def commanded(self, u: float) -> None:
-        """Takes the command of the coming period, and moves to its end."""
-        commands = self._commands
-        before = commands[0]
-        commands.append(u)
-        now = (*self._states, commands[0], before)
-        if self._expected is not None:
-            self._expected += dot(self._turn, now)
-        self._states = tuple([dot(row, now) for row in self._rows])
-        waiting = self._period * (sum(commands) - commands[0]) + self._late * commands[0]
-        self.due = dot(self._due, self._states) + waiting
+    return Predictor(((0.0,) * len(rows), (0.0,) * (periods + 1), 0.0, 0.0, nan), seen, commanded)
 
 
-def _rows(
-    response: Response | None, period: float
-) -> tuple[int, tuple[tuple[float, ...], ...], tuple[float, ...], tuple[float, ...], float]:
+def _after(rows: Rows, due: tuple[float, ...]) -> Callable[[tuple[float, ...]], tuple[tuple[float, ...], float]]:
+    """From what the rows multiply to the states after a period and d of them alone: see `_rows`."""
+
+    def after(vector: tuple[float, ...]) -> tuple[tuple[float, ...], float]:
+        x = moved_on(rows, vector)
+        return x, dot(due, x)
+
+    def without_response(vector: tuple[float, ...]) -> tuple[tuple[float, ...], float]:
+        return (), 0.0
+
+    return after if rows else without_response
+
+
+def states(now: Predicted) -> tuple[float, ...]:
+    """The response's states, then the commands that still act, latest first: those of `model`."""
+    x, commands, _, _, _ = now
+    return (*x, *commands[::-1])
+
+
+def _rows(response: Response | None, period: float) -> tuple[int, Rows, tuple[float, ...], tuple[float, ...], float]:
     """The whole periods in the delay, and the rows that multiply (states, command that begins to act, one before it).
 
     They give the states after a period and the turn in it; then the row of d, and what is left of the delay, s. Without
@@ -118,7 +131,7 @@ class Feedback(NamedTuple):
     disturbance: float
 
     def linear(self, plant: Linear, period: float, smoothing: float) -> Linear:
-        """The law from (e, r) to u as `Predictor` flies it behind `plant`, a `model`.
+        """The law from (e, r) to u as a `Predictor` flies it behind `plant`, a `model`.
 
         Its states are those of the model, w, and the heading error that is expected next.
         """

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import asin, atan2, copysign, cos, hypot, pi, radians, sin, sqrt
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt
 
 from autopilot.angles import wrap
-from autopilot.guidance import Guidance, LawStep, Observation, Telling, telling
+from autopilot.guidance import Guidance, LawStep, Memory, Observation, Remembering, Telling, telling
 from autopilot.quantities import About, DegreesPerSecond, Metres, Unlimited
 
 PAPER_STANDOFF, PAPER_AIRSPEED = 200.0, 13.0  # m, m/s: of the circle and the aircraft of Table 1
@@ -59,7 +59,7 @@ def relative_motion(o: Observation, R_d: float, v_a: float, psi_a: float) -> Mot
 def feed_forward_ahead(o: Observation, motion: Motion, R_d: float, v_a: float, psi_a: float, time: float) -> float:
     """The rate of the desired heading in `time` seconds, rad/s, if the aircraft goes on around the target as now."""
     _, _, lam_dot, _, psi_a_d_dot = motion
-    x, y, *own, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now = o
+    x, y, v_x, v_y, speed, psi, psi_dot, bank, p, v_n, W_x, W_y, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now = o
     x_r, y_r, turned = x - x_t, y - y_t, lam_dot * time
     cos_turned, sin_turned = cos(turned), sin(turned)
     if a_t or omega_t:
@@ -68,7 +68,9 @@ def feed_forward_ahead(o: Observation, motion: Motion, R_d: float, v_a: float, p
         cos_t, sin_t = faster * cos(omega_t * time), faster * sin(omega_t * time)
         v_t_x, v_t_y = v_t_x * cos_t - v_t_y * sin_t, v_t_x * sin_t + v_t_y * cos_t
     x, y = x_t + x_r * cos_turned - y_r * sin_turned, y_t + x_r * sin_turned + y_r * cos_turned
-    later = _observation((x, y, *own, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now))
+    later = _observation(
+        (x, y, v_x, v_y, speed, psi, psi_dot, bank, p, v_n, W_x, W_y, x_t, y_t, v_t_x, v_t_y, a_t, omega_t, now)
+    )
     _, _, lam_dot, _, psi_a_d_dot = relative_motion(later, R_d, v_a, psi_a + (lam_dot + psi_a_d_dot) * time)
     return lam_dot + psi_a_d_dot
 
@@ -93,11 +95,23 @@ def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> flo
 
 _SLOWEST = 1e-3  # m/s: no airspeed that a law computes with is smaller
 _STANDS_STILL = 1.0 - 1e-6  # wind over airspeed: from here on the aircraft may stand still, where Eq. (3) has no value
+
+
+def _measured_airspeed(o: Observation) -> float:
+    v_a = o.airspeed
+    return _SLOWEST if v_a < _SLOWEST else v_a
+
+
+def _airspeed_over_ground(o: Observation) -> float:
+    v_a = hypot(o.velocity_north - o.wind_north, o.velocity_east - o.wind_east)
+    return _SLOWEST if v_a < _SLOWEST else v_a
+
+
 AIRSPEEDS: Mapping[str, Callable[[Observation], float]] = MappingProxyType(  # the v_a of a law, by its setting
     {
         "nominal": lambda o: o.nominal_airspeed,
-        "measured": lambda o: max(o.airspeed, _SLOWEST),
-        "ground": lambda o: max(hypot(o.velocity_north - o.wind_north, o.velocity_east - o.wind_east), _SLOWEST),
+        "measured": _measured_airspeed,
+        "ground": _airspeed_over_ground,
     }
 )
 _guidance, _observation = Guidance._make, Observation._make  # from a tuple, in half the time of the constructor
@@ -138,20 +152,48 @@ def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
     return limited_step(law, answer)
 
 
-def limited_step(
-    law: StandoffLaw,
-    answer: Callable[[Observation, float, float], Answer],
-    applied: Callable[[float, float], None] | None = None,
-) -> LawStep:
+def limited_step(law: StandoffLaw, answer: Callable[[Observation, float, float], Answer]) -> LawStep:
     """A law in flight, with the airspeed, the limit and the direction that it is set to.
 
-    `answer` gets the observation, v_a and psi_a, and answers for the paper's sense of circling. `applied` tells a law
-    with memory what became of its answer: the limited command and the equally limited feed-forward, rad/s.
+    `answer` gets the observation, v_a and psi_a, and answers for the paper's sense of circling.
     """
+    measured = _measured(law)
+
+    def step(o: Observation) -> Guidance:
+        v_a, psi_a, limit = measured(o)
+        return _limited(answer(o, v_a, psi_a), limit)
+
+    return step if law.direction == "paper" else mirrored(step)
+
+
+def remembering_step(
+    law: StandoffLaw,
+    answer: Callable[[Observation, float, float, Memory], tuple[Answer, Memory]],
+    applied: Callable[[Memory, float], Memory],
+    memory: Memory,
+) -> LawStep:
+    """The same for a law with memory, which its answer gets as well and gives back; `memory` is that at the start.
+
+    `applied` adds to it what became of the answer: the limited command beyond the equally limited feed-forward, rad/s.
+    """
+    measured = _measured(law)
+
+    def step(o: Observation, memory: Memory) -> tuple[Guidance, Memory]:
+        v_a, psi_a, limit = measured(o)
+        answered, memory = answer(o, v_a, psi_a, memory)
+        guidance = _limited(answered, limit)
+        return guidance, applied(memory, guidance[0] - max(-limit, min(limit, answered[3])))
+
+    own = Remembering(step, memory)
+    return own if law.direction == "paper" else mirrored(own)
+
+
+def _measured(law: StandoffLaw) -> Callable[[Observation], tuple[float, float, float]]:
+    """From an observation to the law's v_a and psi_a, and to the limit of its heading rate, rad/s."""
     max_rate = law.max_heading_rate
     airspeed, by_course = AIRSPEEDS[law.airspeed], law.command == "course_rate"
 
-    def step(o: Observation) -> Guidance:
+    def measured(o: Observation) -> tuple[float, float, float]:
         v_a = airspeed(o)
         psi_a, limit = o.heading, max_rate
         if by_course:
@@ -159,19 +201,30 @@ def limited_step(
             psi_a = heading_from_course(v_a, atan2(o.velocity_east, o.velocity_north), W_x, W_y)
             if hypot(W_x, W_y) < _STANDS_STILL * v_a:
                 limit = max_rate / course_rate_ratio(v_a, psi_a, W_x, W_y)  # |u_chi| <= max_rate, Eq. (3)
-        r, s, heading_error, feed_forward, rest = answer(o, v_a, psi_a)
-        unlimited = feed_forward + rest
-        limited = unlimited if -limit < unlimited < limit else copysign(limit, unlimited)
-        if applied:
-            applied(limited, max(-limit, min(limit, feed_forward)))
-        return _guidance((limited, r, s, heading_error, feed_forward, unlimited))
+        return v_a, psi_a, limit
 
-    return step if law.direction == "paper" else mirrored(step)
+    return measured
+
+
+def _limited(answer: Answer, limit: float) -> Guidance:
+    """The answer with its command within +-`limit`, rad/s."""
+    r, s, heading_error, feed_forward, rest = answer
+    unlimited = feed_forward + rest
+    limited = unlimited if -limit < unlimited < limit else copysign(limit, unlimited)
+    return _guidance((limited, r, s, heading_error, feed_forward, unlimited))
 
 
 def mirrored(step: LawStep) -> LawStep:
     """The same law the other way round: it circles clockwise on a map where the other circles anticlockwise."""
-    return lambda o: _mirror_guidance(step(_mirror_observation(o)))
+    if not isinstance(step, Remembering):
+        return lambda o: _mirror_guidance(step(_mirror_observation(o)))
+    recalling = step.step
+
+    def turned(o: Observation, memory: Any) -> tuple[Guidance, Any]:
+        guidance, memory = recalling(_mirror_observation(o), memory)
+        return _mirror_guidance(guidance), memory
+
+    return Remembering(turned, step.memory)
 
 
 def _mirror_observation(o: Observation) -> Observation:

@@ -16,7 +16,7 @@ from autopilot import lq_orbit, nftsm_lead
 from autopilot.guidance import Context, Guidance, Law, LawStep, Observation
 from autopilot.laws import law
 from autopilot.nftsm_lead import NftsmLead
-from autopilot.predictor import Predictor, model
+from autopilot.predictor import model, predictor, states
 from autopilot.response import Response, plain
 from harness.limit_cycle.linear import NO_LINEARISATION, crossing_and_margin, linearised
 from harness.limit_cycle.margin import following
@@ -43,45 +43,45 @@ BOTH = pytest.mark.parametrize("own", [LEAD, LQ], ids=["nftsm_lead", "lq_orbit"]
 @pytest.mark.parametrize("response", RESPONSES)
 @pytest.mark.parametrize("period", [0.02, 0.05, 0.13])
 def test_what_is_due_is_what_was_commanded_and_lagged_has_not_turned(response: Response, period: float) -> None:
-    predictor = Predictor(response, period, 0.5)
+    now, seen, commanded = predictor(response, period, 0.5)
     plant = Lagged(response).start(Start(heading=0.0), Air())
     rng, asked, turned = np.random.default_rng(1), 0.0, 0.0
     for u in rng.uniform(-0.2, 0.2, 100):
         before = plant.state.heading
         plant.advance(u, period)
-        predictor.seen(turned)
-        predictor.commanded(u)
+        now = commanded(seen(now, turned), u)
         asked += period * u
         turned += math.remainder(plant.state.heading - before, math.tau)
-        assert predictor.due == pytest.approx(asked - turned, abs=1e-9)
-        assert predictor.disturbance == pytest.approx(0.0, abs=1e-7)
+        _, _, due, disturbance, _ = now
+        assert due == pytest.approx(asked - turned, abs=1e-9)
+        assert disturbance == pytest.approx(0.0, abs=1e-7)
 
 
 @pytest.mark.parametrize("response", [*RESPONSES, None])
 def test_the_model_is_the_predictor_as_matrices(response: Response | None) -> None:
-    predictor, matrices = Predictor(response, PERIOD, 0.5), model(response, PERIOD)
+    (now, _, commanded), matrices = predictor(response, PERIOD, 0.5), model(response, PERIOD)
     x = np.zeros(len(matrices.A))
     for u in np.random.default_rng(2).uniform(-1.0, 1.0, 30):
         x = matrices.A @ x + matrices.B[:, 0] * u
-        predictor.commanded(u)
-        assert predictor.states == pytest.approx(x.tolist(), abs=1e-12)
-        assert predictor.due == pytest.approx((matrices.C @ x)[1], abs=1e-12)
+        now = commanded(now, u)
+        assert states(now) == pytest.approx(x.tolist(), abs=1e-12)
+        assert now[2] == pytest.approx((matrices.C @ x)[1], abs=1e-12)
 
 
 def test_a_steady_disturbance_is_observed() -> None:
-    predictor = Predictor(STICK, PERIOD, 0.5)
+    now, seen, commanded = predictor(STICK, PERIOD, 0.5)
     for k in range(200):
-        predictor.seen(math.remainder(3.0 + 0.02 * k * PERIOD, math.tau))  # beyond pi on the way
-        predictor.commanded(0.0)
-    assert predictor.disturbance == pytest.approx(0.02, rel=1e-6)
+        now = seen(now, math.remainder(3.0 + 0.02 * k * PERIOD, math.tau))  # beyond pi on the way
+        now = commanded(now, 0.0)
+    assert now[3] == pytest.approx(0.02, rel=1e-6)
 
 
 @pytest.mark.parametrize("response", RESPONSES)
 def test_the_lag_is_what_a_steady_command_is_late_by(response: Response) -> None:
-    predictor = Predictor(response, PERIOD, 0.5)
+    now, _, commanded = predictor(response, PERIOD, 0.5)
     for _ in range(4000):
-        predictor.commanded(0.1)
-    assert predictor.due == pytest.approx(0.1 * response.lag, rel=1e-6)
+        now = commanded(now, 0.1)
+    assert now[2] == pytest.approx(0.1 * response.lag, rel=1e-6)
 
 
 @pytest.mark.parametrize("direction", ["paper", "mirrored"])
