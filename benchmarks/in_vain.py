@@ -124,11 +124,11 @@ def of_the_law(repeats: int) -> str:
     step = loop.begun(FLIGHT.law, context_of(FLIGHT))
     compiled, numbers = kernel(step)
     nothing = njit(_nothing)
-    assert tuple(compiled.fly(_SEEN, numbers)) == tuple(step(_SEEN))
+    assert tuple(compiled.fly(_SEEN, *numbers)) == tuple(step(_SEEN))
     nothing(_SEEN)
     python, quick, call = (
         least(work, 4000, repeats)
-        for work in (partial(step, _SEEN), partial(compiled.fly, _SEEN, numbers), partial(nothing, _SEEN))
+        for work in (partial(step, _SEEN), partial(compiled.fly, _SEEN, *numbers), partial(nothing, _SEEN))
     )
     return (
         f"**The law alone compiled, in a 6-DOF flight**: a command takes {quick:.2f} µs, in Python {python:.2f}. "

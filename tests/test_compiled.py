@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import harness
-from autopilot.guidance import UNKNOWN, started
+from autopilot.guidance import UNKNOWN, Guidance, Observation, Remembering, started
 from autopilot.laws import law
+from autopilot.response import dot
+from autopilot.standoff import mirrored
 from harness import loop
 from harness.compiled import arithmetic, engine
 from harness.compiled import kernel as kernels
@@ -33,14 +35,21 @@ KINDS = (
     ("kinematic", "npfg", "mirrored", "measured"),
     ("lagged", "nftsm", "paper", "ground"),
     ("coordinated", "smc", "mirrored", "ground"),
+    ("kinematic", "nftsm_lead", "mirrored", "ground"),
+    ("kinematic", "lq_orbit", "paper", "nominal"),
+    ("lagged", "nftsm_lead", "paper", "ground"),
+    ("lagged", "lq_orbit", "mirrored", "ground"),
+    ("coordinated", "nftsm_lead", "mirrored", "measured"),
+    ("coordinated", "lq_orbit", "paper", "ground"),
 )
+SIXDOF = (("sixdof", "lq_orbit", "mirrored", "ground"), ("sixdof", "nftsm_lead", "paper", "ground"))
 AIRSPEEDS = {"ultra_stick_25e": 13.0, "skywalker_x8": 13.0, "aerosonde": 25.0}
 
 
-def anywhere(seed: int) -> Flight:
-    """A random flight: law, gains, start, wind, gusts, target, period, errors of what is known."""
+def anywhere(seed: int, kind: tuple[str, str, str, str]) -> Flight:
+    """A random flight of a kind: gains, start, wind, gusts, target, period, errors of what is known."""
     draw = random.Random(seed)
-    plant, name, direction, airspeed = KINDS[seed % len(KINDS)]
+    plant, name, direction, airspeed = kind
     aircraft = draw.choice(list(AIRSPEEDS))
     v_a = AIRSPEEDS[aircraft]
     gains: dict[str, Any] = {"k2": draw.uniform(0.5, 15.0), "k3": draw.uniform(0.0, 8.0)} if name == "nftsm" else {}
@@ -62,6 +71,7 @@ def anywhere(seed: int) -> Flight:
     errors = Errors(wind=draw.choice([0.0, 0.5]), course_noise=noise, airspeed_scale=1.0, command_delay=late)
     estimator = replace(FLIGHT.estimator, turn_rate=draw.choice(["known", "unknown"]))
     position = (draw.uniform(-600.0, 600.0), draw.uniform(-600.0, 600.0))
+    estimator = replace(estimator, kind="ekf" if seed % 5 == 4 else "truth")
     return Flight(
         plant=plant, law=own, aircraft=aircraft, duration=draw.choice([5.0, 10.0, 20.0]), seed=seed,
         guidance_period=draw.choice([0.05, 0.1, 0.25]), wind=wind, target=target, errors=errors, estimator=estimator,
@@ -78,7 +88,7 @@ def compiled(flight: Flight) -> FlightLog:
 def test_500_random_flights_have_the_same_digests_and_tables_compiled_as_in_python() -> None:
     outcomes = set()
     for seed in range(500):
-        flight = anywhere(seed)
+        flight = anywhere(seed, KINDS[seed % len(KINDS)])
         plain, quick = loop.simulate(flight), compiled(flight)
         assert quick.digest == plain.digest, flight
         assert quick.reason == plain.reason
@@ -89,11 +99,12 @@ def test_500_random_flights_have_the_same_digests_and_tables_compiled_as_in_pyth
 
 def test_flights_on_sixdof_by_compiled_steps_have_the_tables_of_python_however_they_end() -> None:
     outcomes, stalled = set(), 0
-    for seed in range(0, 120, 5):  # with one law
-        flight, draw = anywhere(seed), random.Random(seed)
+    for seed in range(60):
+        kind = KINDS[0] if seed < 40 else SIXDOF[seed % len(SIXDOF)]
+        flight, draw = anywhere(seed, kind), random.Random(seed)
         gust = Gust(from_=1.0, to=4.0, velocity=(0.0, 10.0, draw.choice([0.0, 12.0, 25.0])))  # some stall
         flight = replace(
-            flight, plant="sixdof", aircraft="ultra_stick_25e", errors=replace(flight.errors, command_delay=0.0),
+            flight, plant="sixdof", aircraft="ultra_stick_25e",
             wind=replace(flight.wind, gusts=(gust,), turbulence=draw.choice(["none", "moderate"])),
             start=replace(flight.start, airspeed=13.0, altitude=draw.choice([40.0, 120.0])),
             estimator=replace(flight.estimator, kind=draw.choice(["truth", "ekf"])),
@@ -101,9 +112,10 @@ def test_flights_on_sixdof_by_compiled_steps_have_the_tables_of_python_however_t
         plain, quick = loop.simulate(flight), compiled(flight)
         assert (quick.digest, quick.reason) == (plain.digest, plain.reason), flight
         assert np.array_equal(quick.table, plain.table, equal_nan=True), flight
-        outcomes.add(plain.outcome)
+        outcomes.add((plain.outcome, flight.errors.command_delay == 0.12))
         stalled += plain.outcome is Outcome.COMPLETED and bool((plain["angle_of_attack"] > 0.5).any())
-    assert outcomes >= {Outcome.COMPLETED, Outcome.DEPARTED, Outcome.GROUND, Outcome.TARGET_LOST}
+    assert outcomes >= {(Outcome.TARGET_LOST, False), (Outcome.GROUND, False)}
+    assert outcomes >= {(how, late) for how in (Outcome.COMPLETED, Outcome.DEPARTED) for late in (False, True)}
     assert stalled
 
 
@@ -164,6 +176,14 @@ def test_compiled_arithmetic_has_the_bits_of_python_and_raises_where_python_does
             arguments[1] = 2.0  # which a compiler knows as a product
         made = outcome(getattr(arithmetic, name), *arguments)
         assert made == outcome(python, *arguments), arguments
+
+
+def test_compiled_sums_have_the_bits_of_python() -> None:
+    draw = random.Random(0)
+    for _ in range(2000):
+        row, values = ([draw.choice([-1.0, 1.0]) * math.exp(draw.uniform(-9.0, 9.0)) for _ in range(9)] for _ in "ab")
+        assert arithmetic.added(np.array(values)) == sum(values)
+        assert arithmetic.dot(np.array(row), np.array(values)) == dot(row, values)
 
 
 OWN = '''
@@ -228,20 +248,51 @@ def test_both_engines_make_the_same_rows_with_a_law_of_ones_own_whatever_it_rais
     assert np.array_equal(compiled(flight)["law_far"], loop.simulate(flight)["law_far"])
 
 
+def test_a_flight_that_cannot_be_compiled_is_refused_where_that_is_asked(tmp_path: Path) -> None:
+    file = own(tmp_path, "nonlocal turns; turns += 1")
+    ran = invoke("run", file, "--out", tmp_path / "out", "--engine", "compiled")
+    assert ran.exit_code == 2
+    why = "on kinematic: step: it keeps a variable from one call to the next"
+    assert why in ran.output.splitlines()[-1], ran.output
+
+
+def remembering(after: Callable[[Any], Any], memory: Any) -> Flight:
+    """A flight of a law that turns the faster the more it has answered; `after` makes of its memory the next one."""
+
+    def step(o: Observation, memory: Any) -> tuple[Guidance, Any]:
+        return turning(1e-4 * memory[0]), after(memory)
+
+    return replace(FLIGHT, law=OwnLaw(lambda: Remembering(step, memory)))
+
+
 @pytest.mark.parametrize(
-    ("settings", "why"),
+    ("after", "memory"),
     [
-        (["plant=sixdof", "errors.command_delay_s=0.1"], "on sixdof: errors.command_delay_s delays the command"),
-        (["law.name=lq_orbit", "law.gains=slow"], "the law lq_orbit on kinematic: it holds "),
+        (lambda memory: (memory[0] + 1.0,), (0.0,)),
+        (lambda memory: (memory[0] + 1, not memory[1]), (0, False)),
+        (lambda memory: (sum(memory[1]), (*memory[1][1:], memory[0] + 0.1)), (0.3, (0.1, 0.7))),
     ],
 )
-def test_a_flight_that_cannot_be_compiled_is_refused_where_that_is_asked(
-    tmp_path: Path, settings: list[str], why: str
-) -> None:
-    words = [word for setting in ("plant=kinematic", *settings) for word in ("--set", setting)]
-    ran = invoke("run", EXPERIMENTS / "stationary.toml", "--out", tmp_path, *words, "--engine", "compiled")
-    assert ran.exit_code == 2
-    assert why in ran.output.splitlines()[-1], ran.output
+def test_a_law_that_declares_its_memory_flies_compiled_as_in_python(after: Any, memory: Any) -> None:
+    flight = remembering(after, memory)
+    for flown in (flight, replace(flight, law=OwnLaw(lambda: mirrored(flight.law.start(UNKNOWN))))):
+        plain, quick = loop.simulate(flown), compiled(flown)
+        assert np.array_equal(quick.table, plain.table, equal_nan=True)
+        assert abs(plain["heading_rate_command"][-1]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("after", "memory", "why"),
+    [
+        (lambda memory: memory, (1.0, [1.0]), "its memory holds list"),
+        (lambda memory: memory, (1.0, None), "its memory holds NoneType"),
+        (lambda memory: (*memory, 1.0), (1.0,), "Numba does not compile it"),
+    ],
+)
+def test_a_memory_of_other_things_or_of_growing_length_is_flown_by_python(after: Any, memory: Any, why: str) -> None:
+    flight = remembering(after, memory)
+    assert engine.why_plain(flight).startswith(why)
+    assert engine.simulate(flight).digest == loop.simulate(flight).digest
 
 
 def test_the_parent_of_a_run_flies_no_model_of_somebody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -255,7 +306,7 @@ def test_the_parent_of_a_run_flies_no_model_of_somebody_else(tmp_path: Path, mon
     assert "2 flown, 0 earlier, 0 failed" in invoke("run", EXPERIMENTS / "stationary.toml", *words).output
 
 
-def test_a_law_with_a_memory_is_flown_by_python_which_is_said_once(
+def test_a_law_that_keeps_a_variable_is_flown_by_python_which_is_said_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("harness.runs.engine.WORTH", 0.0)

@@ -60,6 +60,7 @@ class MyLaw(StandoffLaw):
         """Sentences on what these gains break of the law's theory; `speed_ratio` is (v_t + v_w) / v_a."""
         return ["v_t + v_w is not below v_a"] if speed_ratio >= 1.0 else []
 
-    # A law with memory may also have a method
+    # A law with memory returns `autopilot.guidance.Remembering(step, memory)`, which can be compiled: its step is given
+    # the memory and gives back the next one. It may also have a method
     #     def linearised(self, context: Context, amplitude: float) -> autopilot.linear.Linear:
     # from (heading error, range error) to its command: from it `harness predict` has the margin to a limit cycle.

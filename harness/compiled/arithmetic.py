@@ -252,29 +252,41 @@ def hypot(x: float, y: float) -> float:
 
 
 @jit
-def _dot_rounded(row: Any, values: Any) -> float:
-    """`sum` of the products as Python 3.11 adds."""
-    total = 0.0
-    for i in range(len(values)):
-        total += row[i] * values[i]
-    return total
+def _rounded(total: float, lost: float, x: float) -> tuple[float, float]:
+    """The sum and what is lost of it, with x added as Python 3.11 does: nothing is kept."""
+    return total + x, lost
 
 
 @jit
-def _dot_compensated(row: Any, values: Any) -> float:
-    """`sum` of the products as Python adds since 3.12: what is lost is kept and added in the end."""
+def _compensated(total: float, lost: float, x: float) -> tuple[float, float]:
+    """The same since Python 3.12: what is lost is kept and added in the end."""
+    t = total + x
+    if abs(total) >= abs(x):
+        return t, lost + ((total - t) + x)
+    return t, lost + ((x - t) + total)
+
+
+_added = _compensated if sys.version_info >= (3, 12) else _rounded
+
+
+@jit
+def _ended(total: float, lost: float) -> float:
+    return total + lost if lost != 0.0 and math.isfinite(lost) else total
+
+
+@jit
+def dot(row: Any, values: Any) -> float:
+    """`sum` of the products."""
     total, lost = 0.0, 0.0
     for i in range(len(values)):
-        x = row[i] * values[i]
-        t = total + x
-        if abs(total) >= abs(x):
-            lost += (total - t) + x
-        else:
-            lost += (x - t) + total
-        total = t
-    if lost != 0.0 and math.isfinite(lost):
-        return total + lost
-    return total
+        total, lost = _added(total, lost, row[i] * values[i])
+    return _ended(total, lost)
 
 
-dot = _dot_compensated if sys.version_info >= (3, 12) else _dot_rounded
+@jit
+def added(values: Any) -> float:
+    """`sum` of floats."""
+    total, lost = 0.0, 0.0
+    for i in range(len(values)):
+        total, lost = _added(total, lost, values[i])
+    return _ended(total, lost)

@@ -11,17 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.guidance import Remembering
 from autopilot.response import Delay, Piece
 from harness import loop
 from harness.compiled.kernel import Kernel, NotCompiledError, is_installed, kernel, refuse
+from harness.compiled.lifted import NotLiftedError, form
 from harness.compiled.loop import (
     COMPLETED,
     NOT_FLYING,
     TARGET_LOST,
     UNUSUAL,
-    Look,
     at_once,
     flown,
+    forgetting,
     in_pieces,
     looking,
     moving,
@@ -29,7 +31,7 @@ from harness.compiled.loop import (
 from harness.flight import Flight, air_of, command_delay, context_of, plant_of
 from harness.knowledge import Estimation, Instruments, Sighting, perfect_estimator, sighting
 from harness.log import COLUMNS, FlightLog
-from harness.plants.ladder import PLANTS
+from harness.plants.late import Late
 from harness.plants.level import InPieces, Level, MovingInPieces, States
 from harness.plants.plant import End, Outcome
 from harness.plants.state import State
@@ -41,7 +43,7 @@ from harness.world.track import Track, load_track
 Array = NDArray[np.float64]
 _TRIED = 100.0  # s of the first flight of a kernel, which Python flies as well
 _AT_ONCE = 20_000  # rows between two calls of `watch`
-_TRUSTED: set[Any] = set()  # kernels that flew a flight as Python did
+_TRUSTED: set[Any] = set()  # kernels, and forms of memory, that flew a flight as Python did
 
 
 def simulate(flight: Flight, watch: loop.Watch | None = None) -> FlightLog:
@@ -73,11 +75,11 @@ def _trusted(flight: Flight, watch: loop.Watch | None) -> FlightLog:
     ready = _ready(flight)
     compiled, held = kernel(ready.function)
     log = _flown(flight, watch, ready, compiled, held)
-    if compiled not in _TRUSTED:
+    if (compiled, ready.form) not in _TRUSTED:
         if not _begins(log, loop.simulate(_beginning(flight))):
             refuse(ready.function, "compiled, it does not fly to the last bit as in Python")
             raise NotCompiledError("compiled, it does not fly to the last bit as in Python")
-        _TRUSTED.add(compiled)
+        _TRUSTED.add((compiled, ready.form))
     return log
 
 
@@ -110,26 +112,26 @@ class _Ready(NamedTuple):
     """A flight before its first row."""
 
     function: Callable[..., Any]  # what is compiled
+    form: Any  # of what the law remembers: for another it is compiled anew
     fly: Callable[[Callable[..., Any], Any, _Arrays, bool], _Progress]
     """By the compiled function and the numbers that it holds, into rows; last, whether somebody watches."""
 
 
 def _ready(flight: Flight) -> _Ready:
     """Raises `NotCompiledError` for a flight that cannot be compiled, or whose law cannot start."""
-    if PLANTS[flight.plant].has_body and flight.errors.command_delay:
-        raise NotCompiledError("errors.command_delay_s delays the command")
     air = air_of(flight)
     flying = plant_of(flight).start(flight.start, air)
     try:
-        look = looking(loop.begun(flight.law, context_of(flight)))
+        law = loop.begun(flight.law, context_of(flight))
     except End as end:
         raise NotCompiledError(str(end)) from None
+    own = law if isinstance(law, Remembering) else Remembering(forgetting(law), ())
     if isinstance(flying, Level):
-        return _in_closed_form(flight, look, air, flying)
-    return _by_steps(flight, look, flying)
+        return _in_closed_form(flight, own, air, flying)
+    return _by_steps(flight, own, flying)
 
 
-def _in_closed_form(flight: Flight, look: Look, air: Air, flying: Level) -> _Ready:
+def _in_closed_form(flight: Flight, law: Remembering[Any], air: Air, flying: Level) -> _Ready:
     """The whole loop is compiled."""
     last, (whole, part) = flight.periods, command_delay(flight)
     parts = (part, flight.guidance_period - part) if part else (flight.guidance_period,)
@@ -144,17 +146,17 @@ def _in_closed_form(flight: Flight, look: Look, air: Air, flying: Level) -> _Rea
 
     def fly(compiled: Callable[..., Any], held: Any, rows: _Arrays, watched: bool) -> _Progress:
         velocity, drift = air.sampled(late[-1], last)
-        done, state, ended = 0, (tuple(flying.moved), states), COMPLETED
+        done, state, ended = 0, (tuple(flying.moved), states, law.memory), COMPLETED
         while done <= last and ended == COMPLETED:
             end = min(last + 1, done + _AT_ONCE if done else 1) if watched else last + 1
             before = velocity, drift, late, line, (done, end, last), flight.start.altitude
-            ended, done, *state = compiled(*rows, *before, _known(flight), *state, held)
+            ended, done, *state = compiled(*rows, *before, _known(flight), *state, *held)
             yield ended, done
 
-    return _Ready(flown(look, step), fly)
+    return _Ready(flown(looking(law.step), step), _form(law.memory), fly)
 
 
-def _by_steps(flight: Flight, look: Look, flying: Any) -> _Ready:
+def _by_steps(flight: Flight, law: Remembering[Any], flying: Any) -> _Ready:
     """JSBSim flies the periods, and what is done between two of them is compiled."""
     from harness.compiled.stepwise import reading  # late: only this plant needs JSBSim
     from harness.plants.sixdof import SixDofFlying
@@ -166,26 +168,40 @@ def _by_steps(flight: Flight, look: Look, flying: Any) -> _Ready:
     record = struct.Struct(f"{len(readers) + 1}d")
 
     def fly(compiled: Callable[..., Any], held: Any, rows: _Arrays, watched: bool) -> _Progress:
-        values, known = bytearray(record.size), _known(flight)
+        values, known, memory = bytearray(record.size), _known(flight), law.memory
         read, before = np.frombuffer(values), flying.heading()
+        late = Late(flying, *command_delay(flight)) if flight.errors.command_delay else None
+        length = period  # of what was flown last: commands that are late act in two parts of a period
         for k in range(last + 1):
             record.pack_into(values, 0, *[get() for get in readers], before)
-            ended, command = compiled(read, *rows, k, k == 0, stall, frame, known, held)
+            ended, command, memory = compiled(read, *rows, k, k == 0, stall, frame, known, memory, *held)
             if ended == NOT_FLYING:
                 if not watched:  # it may end here
                     yield COMPLETED, k
-                flying.judge(State._make(rows.table[k, 1 : 1 + len(State._fields)].tolist()), period)
-                ended, command = compiled(read, *rows, k, True, stall, frame, known, held)
+                flying.judge(State._make(rows.table[k, 1 : 1 + len(State._fields)].tolist()), length)
+                ended, command, memory = compiled(read, *rows, k, True, stall, frame, known, memory, *held)
             else:
                 flying.stalled_for = 0.0
-            if watched or ended != COMPLETED or k == last:
+            if watched or late or ended != COMPLETED or k == last:  # late, it may end within the period
                 yield ended, k + 1
             if ended != COMPLETED:
                 return
             if k < last:
-                before = flying.fly(command, period)
+                if late:
+                    *earlier, (command, length) = late.parts(command, period)
+                    for part in earlier:
+                        flying.advance(*part)
+                before = flying.fly(command, length)
 
-    return _Ready(reading(look), fly)
+    return _Ready(reading(looking(law.step)), _form(law.memory), fly)
+
+
+def _form(memory: Any) -> Any:
+    """The form of what a law remembers. Raises `NotCompiledError`."""
+    try:
+        return form("its memory holds", memory)
+    except NotLiftedError as error:
+        raise NotCompiledError(str(error)) from None
 
 
 def _known(flight: Flight) -> tuple[float, ...]:

@@ -51,7 +51,7 @@ _KERNELS: dict[Shape, Kernel | str] = {}  # by the shape of what the loop holds;
 
 
 def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
-    """A function compiled, and what it is called with as its last argument. Raises `NotCompiledError`."""
+    """A function compiled, and what it is called with last: the numbers that it holds. Raises `NotCompiledError`."""
     try:
         shape, numbers = held(function)
         hash(shape)
@@ -69,7 +69,7 @@ def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
     found = _KERNELS[shape]
     if isinstance(found, str):
         raise NotCompiledError(found)
-    return found, numbers
+    return found, (numbers,) if numbers else ()
 
 
 def refuse(function: Any, why: str) -> None:

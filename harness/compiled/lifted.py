@@ -29,7 +29,7 @@ _ARITHMETIC = {
         "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "expm1", "log1p", "sqrt", "atan2",
         "copysign", "remainder", "fmod", "hypot", "isfinite", "isnan", "radians", "degrees",
     )
-} | {math.pow: "power", dot: "dot"}  # fmt: skip
+} | {math.pow: "power", dot: "dot", sum: "added"}  # fmt: skip
 _OURS = "jit(forceinline=True)"
 _OWN = "jit(_nrt=True)"  # a law of one's own may make lists: references are counted there
 _REFUSED = {
@@ -88,8 +88,8 @@ def _kind(name: str, value: Any) -> tuple[tuple[Any, ...], Any]:
     if kind is FunctionType or kind is MethodType:
         shape, numbers = held(value)
         return ("function", shape), numbers or None
-    if kind is tuple and value and all(type(x) is float for x in value):
-        return ("tuple", len(value)), value
+    if kind is tuple and value:
+        return ("tuple", form(f"it holds {name}, which is", value)), value
     if _is_record(kind) and all(type(x) in _NUMBERS for x in value):
         return ("record", kind.__name__, kind._fields), tuple(value)
     if is_dataclass(value) and kind.__dataclass_params__.frozen:
@@ -98,6 +98,16 @@ def _kind(name: str, value: Any) -> tuple[tuple[Any, ...], Any]:
     if callable(value) or isinstance(value, ModuleType):
         return ("constant", value), None
     raise NotLiftedError(f"it holds {name}, which is {kind.__name__}")
+
+
+def form(what: str, value: Any) -> Any:
+    """The type of a number, or of a tuple the forms of all in it. Raises `NotLiftedError`, which says what it is of."""
+    kind = type(value)
+    if kind in _NUMBERS:
+        return kind
+    if kind is not tuple:
+        raise NotLiftedError(f"{what} {kind.__name__}")
+    return tuple(form(what, each) for each in value)
 
 
 class Module(NamedTuple):

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from autopilot.guidance import LawStep, Observation
+from autopilot.guidance import Guidance, LawStep, Observation, Recalling
 from autopilot.response import Piece
 from harness.knowledge import heading_in, turned
 from harness.log import LOOP_COLUMNS
@@ -20,7 +20,7 @@ _TARGET = 1 + len(State._fields)  # the first column of the target
 _GUIDANCE = _TARGET + len(TargetState._fields)
 assert len(LOOP_COLUMNS) == _GUIDANCE + 6
 
-Look = Callable[..., tuple[int, float]]
+Look = Callable[..., tuple[int, float, Any]]
 Step = Callable[[Motion, States, float, float, int, Any], tuple[Motion, States]]
 
 
@@ -73,11 +73,22 @@ def moving(at: Callable[[Leg, float], TargetState]) -> Callable[..., Any]:
     return fill
 
 
-def looking(law: LawStep) -> Look:
+def forgetting(law: LawStep) -> Recalling[Any]:
+    """A law without memory."""
+
+    def step(seen: Observation, memory: Any) -> tuple[Guidance, Any]:
+        return law(seen), memory
+
+    return step
+
+
+def looking(law: Recalling[Any]) -> Look:
     """What is done at the beginning of a period: the law sees, answers, and the row is written."""
 
-    def look(table: Any, target: Any, estimate: Any, noise: Any, told: Any, k: int, state: State, known: Any) -> Any:
-        """How the flight ended, and the command; `known` is what of a flight does not change."""
+    def look(
+        table: Any, target: Any, estimate: Any, noise: Any, told: Any, k: int, state: State, known: Any, memory: Any
+    ) -> Any:
+        """How the flight ended, the command, and the law's memory; `known` is what of a flight does not change."""
         period, nominal_airspeed, W_x, W_y, scale, monitoring_range = known
         time = k * period
         v_a, psi, v_x, v_y = state.airspeed, state.heading, state.velocity_north, state.velocity_east
@@ -93,9 +104,9 @@ def looking(law: LawStep) -> Look:
             nominal_airspeed, W_x, W_y, estimate[k, 0], estimate[k, 1], estimate[k, 2], estimate[k, 3],
             estimate[k, 4], estimate[k, 5], time,
         )  # fmt: skip
-        guidance = law(seen)
+        guidance, memory = law(seen, memory)
         if not math.isfinite(guidance.heading_rate):
-            return UNUSUAL, 0.0
+            return UNUSUAL, 0.0, memory
         table[k, 0] = time
         for i in range(len(state)):
             table[k, 1 + i] = state[i]
@@ -111,8 +122,8 @@ def looking(law: LawStep) -> Look:
             told[k, i - 6] = guidance[i]
         x_r, y_r = state.north - target[k, 0], state.east - target[k, 1]
         if monitoring_range < math.inf and math.hypot(x_r, y_r) > monitoring_range:
-            return TARGET_LOST, 0.0
-        return COMPLETED, guidance.heading_rate
+            return TARGET_LOST, 0.0, memory
+        return COMPLETED, guidance.heading_rate, memory
 
     return look
 
@@ -122,7 +133,7 @@ def flown(look: Look, step: Step) -> Callable[..., Any]:
 
     def fly(
         table: Any, target: Any, estimate: Any, noise: Any, told: Any, air: Any, drift: Any, late: Any, line: Any,
-        rows: Any, altitude: float, known: Any, now: Any, states: States,
+        rows: Any, altitude: float, known: Any, now: Any, states: States, memory: Any,
     ) -> Any:  # fmt: skip
         """Fills the rows of the table from `first` on, until `end`; a flight ends with the row `last`.
 
@@ -136,9 +147,9 @@ def flown(look: Look, step: Step) -> Callable[..., Any]:
         moved = Motion(x, y, v_a, psi, rate, bank, roll_rate, bank_command)
         for k in range(first, end):
             state = level_state(moved, altitude, air[k, 0], air[k, 1], air[k, 2])
-            ended, command = look(table, target, estimate, noise, told, k, state, known)
+            ended, command, memory = look(table, target, estimate, noise, told, k, state, known, memory)
             if ended != COMPLETED:
-                return ended, k + 1, now, states
+                return ended, k + 1, now, states, memory
             if k < last:
                 commands[k] = command
                 for i in range(len(parts)):
@@ -148,6 +159,6 @@ def flown(look: Look, step: Step) -> Callable[..., Any]:
                     moved = carried(moved, drift[part, 0], drift[part, 1])
                 x, y, v_a, psi, rate, bank, roll_rate, bank_command = moved
                 now = (x, y, v_a, psi, rate, bank, roll_rate, bank_command)
-        return COMPLETED, end, now, states
+        return COMPLETED, end, now, states, memory
 
     return fly

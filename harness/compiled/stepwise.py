@@ -13,11 +13,12 @@ def reading(look: Look) -> Callable[..., Any]:
 
     def step(
         read: Any, table: Any, target: Any, estimate: Any, noise: Any, told: Any, k: int, judged: bool, stall: float,
-        frame: Any, known: Any,
+        frame: Any, known: Any, memory: Any,
     ) -> Any:  # fmt: skip
-        """How the flight ended, and the command. `read`: the values of the readers, then the heading a step before.
+        """How the flight ended, the command, and the law's memory.
 
-        An aircraft that is not flying is left to be judged, its state in its row; once it is, the law is asked.
+        `read`: the values of the readers, then the heading a step before. An aircraft that is not flying is left to be
+        judged, its state in its row; once it is, the law is asked.
         """
         state = state_of(
             (
@@ -35,7 +36,7 @@ def reading(look: Look) -> Callable[..., Any]:
         if not fine:
             for i in range(len(state)):
                 table[k, 1 + i] = state[i]
-            return NOT_FLYING, 0.0
-        return look(table, target, estimate, noise, told, k, state, known)
+            return NOT_FLYING, 0.0, memory
+        return look(table, target, estimate, noise, told, k, state, known, memory)
 
     return step

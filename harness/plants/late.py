@@ -21,8 +21,11 @@ class Late:
         return self._flying.state
 
     def advance(self, heading_rate: float, period: float) -> None:
+        for acts, length in self.parts(heading_rate, period):
+            self._flying.advance(acts, length)
+
+    def parts(self, heading_rate: float, period: float) -> list[tuple[float, float]]:
+        """What acts in the period in which this command is given, and for how long, s."""
         self._on_the_way.append(heading_rate)
-        present = self._on_the_way.popleft()
-        if self._part:
-            self._flying.advance(present, self._part)
-        self._flying.advance(self._on_the_way[0], period - self._part)
+        earlier, later = self._on_the_way.popleft(), (self._on_the_way[0], period - self._part)
+        return [(earlier, self._part), later] if self._part else [later]
