@@ -9,9 +9,9 @@ from collections.abc import Callable
 from math import asin, atan2, copysign, cos, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
-from autopilot.guidance import LawStep, Observation
+from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.rules import Known, rounded
-from autopilot.standoff import STANDING, Answer, StandoffLaw, limited_step
+from autopilot.standoff import STANDING, StandoffLaw, directed, limited, measured
 
 MARGIN = 1.5  # PX4's NPFG_PERIOD_SF: what the period is longer than the least stable one
 _CLOSEST = 1e-6  # m: as in `standoff.relative_motion`
@@ -118,11 +118,12 @@ def period_by_lag(damping: float, known: Known) -> float:
 
 def circling_step(law: StandoffLaw, steer: Steering) -> LawStep:
     """The law in flight; `steer` answers for the paper's sense of circling."""
-    R_d = law.standoff
+    R_d, known = law.standoff, measured(law)
 
-    def answer(o: Observation, v_a: float, psi_a: float) -> Answer:
+    def step(o: Observation) -> Guidance:
+        v_a, psi_a, limit = known(o)
         seen = circling(o, R_d, v_a, psi_a)
         error, s, feed_forward, rest = steer(seen)
-        return seen.r, s, error, feed_forward, rest
+        return limited(seen.r, s, error, feed_forward, rest, limit)
 
-    return limited_step(law, answer)
+    return directed(law, step)

@@ -142,28 +142,15 @@ class StandoffLaw:
 
 def standoff_step(law: StandoffLaw, reach: Reaching) -> LawStep:
     """The law in flight. `reach` computes (feed-forward, rest of the command, s) for the paper's sense of circling."""
-    R_d = law.standoff
-
-    def answer(o: Observation, v_a: float, psi_a: float) -> Answer:
-        motion = relative_motion(o, R_d, v_a, psi_a)
-        feed_forward, rest, s = reach(motion)
-        return motion[0], s, motion[3], feed_forward, rest
-
-    return limited_step(law, answer)
-
-
-def limited_step(law: StandoffLaw, answer: Callable[[Observation, float, float], Answer]) -> LawStep:
-    """A law in flight, with the airspeed, the limit and the direction that it is set to.
-
-    `answer` gets the observation, v_a and psi_a, and answers for the paper's sense of circling.
-    """
-    measured = _measured(law)
+    R_d, known = law.standoff, measured(law)
 
     def step(o: Observation) -> Guidance:
-        v_a, psi_a, limit = measured(o)
-        return _limited(answer(o, v_a, psi_a), limit)
+        v_a, psi_a, limit = known(o)
+        motion = relative_motion(o, R_d, v_a, psi_a)
+        feed_forward, rest, s = reach(motion)
+        return limited(motion[0], s, motion[3], feed_forward, rest, limit)
 
-    return step if law.direction == "paper" else mirrored(step)
+    return directed(law, step)
 
 
 def remembering_step(
@@ -172,46 +159,51 @@ def remembering_step(
     applied: Callable[[Memory, float], Memory],
     memory: Memory,
 ) -> LawStep:
-    """The same for a law with memory, which its answer gets as well and gives back; `memory` is that at the start.
+    """A law with memory in flight; `memory` is that at the start.
 
-    `applied` adds to it what became of the answer: the limited command beyond the equally limited feed-forward, rad/s.
+    `answer` gets the observation, v_a, psi_a and the memory, and answers for the paper's sense of circling. `applied`
+    adds to the memory what became of it: the limited command beyond the equally limited feed-forward, rad/s.
     """
-    measured = _measured(law)
+    known = measured(law)
 
     def step(o: Observation, memory: Memory) -> tuple[Guidance, Memory]:
-        v_a, psi_a, limit = measured(o)
+        v_a, psi_a, limit = known(o)
         answered, memory = answer(o, v_a, psi_a, memory)
-        guidance = _limited(answered, limit)
-        return guidance, applied(memory, guidance[0] - max(-limit, min(limit, answered[3])))
+        r, s, heading_error, feed_forward, rest = answered
+        guidance = limited(r, s, heading_error, feed_forward, rest, limit)
+        return guidance, applied(memory, guidance[0] - max(-limit, min(limit, feed_forward)))
 
-    own = Remembering(step, memory)
-    return own if law.direction == "paper" else mirrored(own)
+    return directed(law, Remembering(step, memory))
 
 
-def _measured(law: StandoffLaw) -> Callable[[Observation], tuple[float, float, float]]:
-    """From an observation to the law's v_a and psi_a, and to the limit of its heading rate, rad/s."""
+def measured(law: StandoffLaw) -> Callable[[Observation], tuple[float, float, float]]:
+    """From an observation to v_a and psi_a as the law is set to know them, and to the limit of its command, rad/s."""
     max_rate = law.max_heading_rate
     airspeed, by_course = AIRSPEEDS[law.airspeed], law.command == "course_rate"
 
-    def measured(o: Observation) -> tuple[float, float, float]:
+    def known(o: Observation) -> tuple[float, float, float]:
         v_a = airspeed(o)
-        psi_a, limit = o.heading, max_rate
-        if by_course:
-            W_x, W_y = o.wind_north, o.wind_east
-            psi_a = heading_from_course(v_a, atan2(o.velocity_east, o.velocity_north), W_x, W_y)
-            if hypot(W_x, W_y) < _STANDS_STILL * v_a:
-                limit = max_rate / course_rate_ratio(v_a, psi_a, W_x, W_y)  # |u_chi| <= max_rate, Eq. (3)
-        return v_a, psi_a, limit
+        if not by_course:
+            return v_a, o.heading, max_rate
+        W_x, W_y = o.wind_north, o.wind_east
+        psi_a = heading_from_course(v_a, atan2(o.velocity_east, o.velocity_north), W_x, W_y)
+        if hypot(W_x, W_y) < _STANDS_STILL * v_a:
+            return v_a, psi_a, max_rate / course_rate_ratio(v_a, psi_a, W_x, W_y)  # |u_chi| <= max_rate, Eq. (3)
+        return v_a, psi_a, max_rate
 
-    return measured
+    return known
 
 
-def _limited(answer: Answer, limit: float) -> Guidance:
+def limited(r: float, s: float, heading_error: float, feed_forward: float, rest: float, limit: float) -> Guidance:
     """The answer with its command within +-`limit`, rad/s."""
-    r, s, heading_error, feed_forward, rest = answer
     unlimited = feed_forward + rest
-    limited = unlimited if -limit < unlimited < limit else copysign(limit, unlimited)
-    return _guidance((limited, r, s, heading_error, feed_forward, unlimited))
+    command = unlimited if -limit < unlimited < limit else copysign(limit, unlimited)
+    return _guidance((command, r, s, heading_error, feed_forward, unlimited))
+
+
+def directed(law: StandoffLaw, step: LawStep) -> LawStep:
+    """A law that answers for the paper's sense of circling, in the direction that it is set to."""
+    return step if law.direction == "paper" else mirrored(step)
 
 
 def mirrored(step: LawStep) -> LawStep:
