@@ -6,12 +6,15 @@ import signal
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.stats.qmc import discrepancy
 
 import harness
 from benchmarks.guided_falsify import probed
 from benchmarks.planted_failures import flights_needed, needed_at_random
 from harness.review.reading import read_logs
+from harness.search.prober import Prober
 from harness.settings import load_flight
 from harness.verdict.statistics import upper_bound
 from tests.builders import command, invoke, words_of, write
@@ -46,6 +49,19 @@ def test_planted_failures_with_a_slope_are_found_with_half_of_what_random_search
     needed = [flights_needed(kind, dimensions, share, seed) for seed in range(6)]
     assert max(needed) <= 0.5 * needed_at_random(share, 0.95)
     assert max(needed) <= 300
+
+
+def test_a_failure_of_one_in_a_thousand_inside_a_flat_step_is_found() -> None:
+    for dimensions in (2, 3, 4):
+        assert max(flights_needed("stairs", dimensions, 0.001, seed) for seed in range(4)) <= 300
+
+
+def test_answers_that_are_all_equal_leave_points_more_even_than_uniform_draws() -> None:
+    prober = Prober(3, 0)
+    for i in range(120):
+        prober.tell(prober.ask(prober.is_uniform(i)), 1.0)
+    even = discrepancy([prober.ask(False).at for _ in range(120)])
+    assert even < 0.5 * discrepancy(np.random.default_rng(0).random((120, 3)))
 
 
 def test_the_counterexample_breaks_the_requirement_when_it_is_flown_again(file: Path, tmp_path: Path) -> None:

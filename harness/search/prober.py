@@ -4,6 +4,10 @@ Until a point fails, the next one is where a failure is most likely; afterwards 
 worst is largest. Uniform draws are among them: they owe nothing to the answers, so they say how much of the space
 fails, and they reach what the model does not expect. The same seed and answers give the same questions.
 
+A smooth process through the steps of a stepped answer (a count, a truth value, a saturated metric) swings below them
+beside each jump, and so looks along the rim of the lowest step again and again. Where several points are equally the
+lowest, every other point is sought inside what they enclose instead; where all are, the points are spread evenly.
+
 A cheaper function may guide it: what that lets expect is subtracted, as far as the answers bear it out, and the process
 models the rest (Kennedy and O'Hagan, *Predicting the output from a complex computer code when fast approximations are
 available*, Biometrika 87, 2000).
@@ -14,7 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 from scipy.special import log_ndtr
+from scipy.stats import qmc
 
 from harness.search.model import LENGTH, NOISE, Array, Model, log_improvement, most_promising
 
@@ -48,7 +54,8 @@ class Prober:
 
     def __init__(self, dimensions: int, seed: int, guide: Guide | None = None) -> None:
         self._dimensions, self._guide = dimensions, guide
-        self._uniform, self._noise = (np.random.default_rng([seed, i]) for i in range(2))
+        self._uniform, self._noise, even = (np.random.default_rng([seed, i]) for i in range(3))
+        self._even = qmc.Halton(dimensions, rng=even)
         self._at: list[Array] = []
         self._robustness: list[float] = []  # NaN of what is not told
         self._model: Model | None = None
@@ -59,11 +66,12 @@ class Prober:
         return position % _ONE_OF == 0 or (self._guide is None and position <= 2 * self._dimensions)
 
     def ask(self, uniform: bool) -> Probe:
-        """A point, to be told later: a uniform draw, or the most promising one."""
+        """A point, to be told later: a uniform draw, or the most promising one, or one among equals."""
         if uniform or not (self._told or self._guide):
             at = (self._uniform if uniform else self._noise).random(self._dimensions)
         else:
-            at = self._most_promising()
+            equals = self._among_equals()
+            at = self._most_promising() if equals is None else equals
         self._at.append(at)
         self._robustness.append(math.nan)
         return Probe(len(self._at) - 1, at)
@@ -91,6 +99,19 @@ class Prober:
             worst = known[np.argsort(robustness[known], kind="stable")[: _MOST // 2]]
             known = np.union1d(worst, known[-(_MOST // 2) :])
         return known
+
+    def _among_equals(self) -> Array | None:
+        """A point sought without the model, where several are equally the lowest; None where it is not its turn."""
+        if not self._told:
+            return None
+        at, robustness = np.array(self._at), np.array(self._robustness)
+        least = np.nanmin(robustness)
+        lowest = np.unique(at[robustness == least], axis=0)  # a point that is asked for twice has no equal
+        higher, untold = at[robustness > least], at[np.isnan(robustness)]
+        is_informed = bool(len(higher) or self._guide)  # the model knows more than nothing
+        if len(lowest) < 2 or (is_informed and len(at) % 2 == 0):
+            return None
+        return _inside(lowest, higher, untold, self._noise) if len(higher) else self._even.random(1)[0]
 
     def _most_promising(self) -> Array:
         if not self._at and self._guide:
@@ -122,6 +143,17 @@ class Prober:
             return np.asarray(log_ndtr(-mean / deviation)) if least >= 0.0 else log_improvement(mean, deviation, least)
 
         return most_promising(promise, centres, self._noise)
+
+
+def _inside(lowest: Array, higher: Array, untold: Array, noise: np.random.Generator) -> Array:
+    """The point that is nearer to the lowest than to the higher ones, and farthest from both: by the product."""
+    tried = np.vstack([lowest, untold])
+
+    def depth(x: Array) -> Array:
+        within, without = (cdist(x, points).min(axis=1) for points in (lowest, higher))
+        return np.where(within < without, cdist(x, tried).min(axis=1) * without, -1.0)
+
+    return most_promising(depth, lowest, noise)
 
 
 def _borne_out(expected: Array, answers: Array, prior: float) -> float:
