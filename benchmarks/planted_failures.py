@@ -85,7 +85,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "dips": Kind("four dips, of which the deepest fails", True, _dips),
         "kink": Kind("a pyramid, kinked along all its edges", False, _kink),
         "ripple": Kind("a paraboloid with ripples: many local minima", False, _ripple),
-        "stairs": Kind("flat steps that end in a jump", False, _bowl, is_stepped=True),
+        "stairs": Kind("flat steps, and a jump in the midst of the lowest", False, _bowl, is_stepped=True),
         "needle": Kind("the same everywhere but where it fails", False, _bowl),
     }
 )
@@ -199,8 +199,8 @@ def page(cells: Sequence[Cell]) -> Iterator[str]:
                 f"{1.0 - (1.0 - cell.share) ** MOST:.0%}."
             )
     yield (
-        "Where nothing near a failure is worse than anywhere else, a model has nothing to go by: uniform draws do "
-        "better."
+        "Where nothing near a failure is worse than anywhere else, a model has nothing to go by: the points are spread "
+        "evenly instead, as good as uniform draws."
     )
     yield "That is so for an outcome and for a truth value; a number tells more."
 
