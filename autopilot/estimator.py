@@ -89,27 +89,29 @@ class Estimator:
     ] = "truth"
     acceleration: Annotated[
         Literal["known", "unknown"],
-        About("whether kind truth includes it, else the law gets 0; kind ekf always gives 0"),
+        About("known: kind truth provides it; unknown: the law receives 0, as always with kind ekf"),
     ] = "known"
     turn_rate: Annotated[
         Literal["known", "unknown"],
-        About("whether kind truth includes it, else the law gets 0; kind ekf always gives 0"),
+        About("known: kind truth provides it; unknown: the law receives 0, as always with kind ekf"),
     ] = "known"
-    period: Annotated[Seconds, Gt(0), Le(1e3), About("of the measurements, T_s")] = 0.5
+    period: Annotated[Seconds, Gt(0), Le(1e3), About("measurement period, T_s")] = 0.5
     sensor_position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (0.0, 0.0)
-    range_variance: Annotated[SquareMetres, Gt(0), About("of the measurement noise, P")] = 0.5
-    azimuth_variance: Annotated[SquareRadians, Gt(0), Le(10), About("of the measurement noise, P")] = 0.015
-    process_position_variance: Annotated[SquareMetres, Ge(0), About("per axis and measurement period, Q")] = 0.2
-    process_velocity_variance: Annotated[SquareMetresPerSecond, Ge(0), About("per axis and measurement period, Q")] = (
-        0.01
-    )
-    lost_share: Annotated[float, Ge(0), Le(1), About("of the measurements, lost at random; never the first")] = 0.0
-    lost_from: Annotated[Seconds, Ge(0), About("since the start: when a gap in the measurements begins")] = 0.0
-    lost_for: Annotated[Seconds, Ge(0), About("length of this gap, in which the filter reckons on")] = 0.0
+    range_variance: Annotated[SquareMetres, Gt(0), About("variance of the range noise, P")] = 0.5
+    azimuth_variance: Annotated[SquareRadians, Gt(0), Le(10), About("variance of the azimuth noise, P")] = 0.015
+    process_position_variance: Annotated[
+        SquareMetres, Ge(0), About("process noise per axis and measurement period, Q")
+    ] = 0.2
+    process_velocity_variance: Annotated[
+        SquareMetresPerSecond, Ge(0), About("process noise per axis and measurement period, Q")
+    ] = 0.01
+    lost_share: Annotated[float, Ge(0), Le(1), About("share of measurements lost at random; never the first")] = 0.0
+    lost_from: Annotated[Seconds, Ge(0), About("time at which a gap in the measurements begins")] = 0.0
+    lost_for: Annotated[Seconds, Ge(0), About("length of this gap, in which the filter predicts only")] = 0.0
     initial_position: Annotated[
-        tuple[Metres, Metres] | None, About("north, east; without it the first measurement")
+        tuple[Metres, Metres] | None, About("initial estimate: north, east; default: the first measurement")
     ] = None
-    initial_position_variance: Annotated[SquareMetres, Ge(0), About("per axis, of a given initial_position")] = 1.0
+    initial_position_variance: Annotated[SquareMetres, Ge(0), About("per axis; used with initial_position")] = 1.0
     initial_velocity: Annotated[tuple[MetresPerSecond, MetresPerSecond], About("north, east")] = (0.0, 0.0)
     initial_velocity_variance: Annotated[
         SquareMetresPerSecond, Ge(0), About("per axis; by default (2 m/s)^2, the speed of the paper's target")

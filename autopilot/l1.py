@@ -31,8 +31,8 @@ class L1(StandoffLaw):
     """ArduPilot's L1 loiter: on the circle the range error swings with this period and damping."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    period: Annotated[float, Ge(0.01), About("s: of the motion around the path")]
-    damping: Annotated[float, Ge(0.01), Le(100), About("damping ratio of the motion around the path")]
+    period: Annotated[float, Ge(0.01), About("s: period of the path-following dynamics")]
+    damping: Annotated[float, Ge(0.01), Le(100), About("damping ratio of the path-following dynamics")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         return circling_step(self, steering(self))

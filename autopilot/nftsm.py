@@ -32,7 +32,7 @@ class Nftsm(StandoffLaw):
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
     alpha2: Annotated[float, Ge(0), About("weight of the fast term of the manifold, Eq. (17)")]
     alpha3: Annotated[float, Ge(0), About("weight of the terminal term, Eq. (17)")]
-    beta2: Annotated[float, Gt(0), Le(100), About("power of the fast term; Definition 5 asks for at least 1")]
+    beta2: Annotated[float, Gt(0), Le(100), About("power of the fast term; Definition 5 requires at least 1")]
     beta3: Annotated[float, Gt(0), Lt(1), About("power of the terminal term")]
     eta: Annotated[float, Ge(1e-9), Le(1), About("|ell| below which the terminal term is smoothed")]
     k1: Annotated[float, Gt(0), About("1/m: ell = arctan(k1 r)")]

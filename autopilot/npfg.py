@@ -36,9 +36,9 @@ class Npfg(StandoffLaw):
     """PX4's NPFG: the look-ahead angle closes as the track error shrinks; the period is bounded by the roll's lag."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    period: Annotated[float, Ge(0.01), About("s: of the motion around the path")]
-    damping: Annotated[float, Ge(0.01), Le(100), About("damping ratio of the motion around the path")]
-    roll_time: Annotated[float, Ge(0), About("s: lag of the roll response, which bounds the period; 0: no bounds")]
+    period: Annotated[float, Ge(0.01), About("s: period of the path-following dynamics")]
+    damping: Annotated[float, Ge(0.01), Le(100), About("damping ratio of the path-following dynamics")]
+    roll_time: Annotated[float, Ge(0), About("s: roll time constant, which bounds the period; 0: no bounds")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         return circling_step(self, steering(self))

@@ -33,7 +33,7 @@ class OrbitField(StandoffLaw):
     """Orbit following of Beard and McLain: k_orbit leans the course towards the orbit, k turns the aircraft to it."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    k_orbit: Annotated[float, Gt(0), About("how steeply the field leans, over the standoff distance")]
+    k_orbit: Annotated[float, Gt(0), About("orbit gain: atan(k_orbit r / R_d) is the course offset towards the orbit")]
     k: Annotated[float, Gt(0), About("1/s: feedback of the course error")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:

@@ -31,16 +31,16 @@ class Response:
     the rate trim, an integrator, leaves; `share` and `rate` are `tail_share` and `tail_rate`.
     """
 
-    delay: Annotated[Seconds, Ge(0), Lt(10), About("from the command to its first effect")]
-    frequency: Annotated[float, Gt(0), About("rad/s: of the bank mode")]
-    damping: Annotated[float, Gt(0), About("of the bank mode")]
-    lead: Annotated[Seconds, About("of the zero: the part that acts at once, such as the side force of a deflection")]
-    sideslip_frequency: Annotated[float, Gt(0), About("rad/s: of the sideslip mode")]
-    sideslip_damping: Annotated[float, Gt(0), About("of the sideslip mode")]
-    zero_frequency: Annotated[float, Gt(0), About("rad/s: of the zeros that nearly cancel the sideslip mode")]
-    zero_damping: Annotated[float, About("of those zeros")]
-    tail_rate: Annotated[float, Gt(0), About("1/s: of the slow tail")]
-    tail_share: Annotated[float, About("share of the response that arrives with the slow tail")]
+    delay: Annotated[Seconds, Ge(0), Lt(10), About("transport delay")]
+    frequency: Annotated[float, Gt(0), About("rad/s: natural frequency of the bank mode")]
+    damping: Annotated[float, Gt(0), About("damping ratio of the bank mode")]
+    lead: Annotated[Seconds, About("time constant of the zero: direct effects, such as the side force of a deflection")]
+    sideslip_frequency: Annotated[float, Gt(0), About("rad/s: natural frequency of the sideslip mode")]
+    sideslip_damping: Annotated[float, Gt(0), About("damping ratio of the sideslip mode")]
+    zero_frequency: Annotated[float, Gt(0), About("rad/s: frequency of the zeros that nearly cancel the sideslip mode")]
+    zero_damping: Annotated[float, About("damping ratio of those zeros")]
+    tail_rate: Annotated[float, Gt(0), About("1/s: pole of the slow tail")]
+    tail_share: Annotated[float, About("share of the slow tail in the response")]
 
     def matrices(self) -> tuple[Array, Array, Array]:
         """(A, b, c) of x' = A x + b u(t - delay), y = c x; shapes (5, 5), (5,), (5,)."""

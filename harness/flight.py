@@ -32,7 +32,7 @@ class InnerLoop:
 class MetricSettings:
     """Thresholds of the metrics, and the range beyond which the target is lost."""
 
-    tolerance: Annotated[Metres, Gt(0), About("the flight has converged once |range error| stays below it")] = 1.0
+    tolerance: Annotated[Metres, Gt(0), About("a flight has converged once |range error| stays below this")] = 1.0
     monitoring_range: Annotated[Metres | None, Gt(0), About("distance beyond which the target is lost")] = None
 
 

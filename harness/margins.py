@@ -26,18 +26,18 @@ class Assess:
     heading_rate_gain: Annotated[
         float,
         Gt(0),
-        About("|flown over commanded - 1| at low frequency. Ours: the 5 % asked of an identified inner loop"),
+        About("|flown over commanded - 1| at low frequency. Ours: the 5 % required of an identified inner loop"),
     ] = 0.05
     limit_cycle_margin: Annotated[
         float,
         Gt(0),
         About(
-            "by what factor the gains may grow before a limit cycle begins. Ours: 1.5, so that a response "
-            "two thirds as quick as identified still has none"
+            "gain margin to the limit cycle. Ours: 1.5, so that an inner loop with two thirds of the identified "
+            "bandwidth still has none"
         ),
     ] = 1.5
     chatter_share: Annotated[
-        float, Ge(0), Lt(1), About("of the flights that show a limit cycle. Ours: as for lost flights")
+        float, Ge(0), Lt(1), About("share of the flights with a limit cycle. Ours: as for lost flights")
     ] = 0.05
     sideslip: Annotated[Degrees, Gt(0), About("rms. Part 60, adverse yaw: 2 deg of sideslip")] = math.radians(2.0)
     altitude_deviation: Annotated[Metres, Gt(0), About("peak. ACS: 100 ft, to the metre below")] = 30.0
@@ -48,10 +48,10 @@ class Assess:
         Degrees, Ge(0), About("bank limit minus bank at the rate limit. Ours: room to correct, as 50 deg leaves for 45")
     ] = math.radians(5.0)
     lost_share: Annotated[
-        float, Ge(0), Lt(1), About("of flights that end early. Ours: the holds are asked to bring 95 % through")
+        float, Ge(0), Lt(1), About("share of the flights that end early. Ours: 95 % of the flights must complete")
     ] = 0.05
     convergence_share_margin: Annotated[
-        float, Ge(0), Lt(1), About("of the shares that converge. Ours: as for lost flights")
+        float, Ge(0), Lt(1), About("difference of the shares that converge. Ours: as for lost flights")
     ] = 0.05
     convergence_time_margin: Annotated[
         float, Gt(0), About("relative to the baseline's mean. Part 60: 10 %, as of a yaw rate")

@@ -160,7 +160,7 @@ def test_settings_that_come_too_near_to_the_limit_cycle_are_refused_before_they_
     words = ("--minimise", "range_error_rms_m", "--flights", 20, "--workers", 0)
     done = invoke("tune", EXPERIMENTS / "tune.toml", "--out", out, "--over", "law.k2=15:20", *words)
     assert done.exit_code == 1
-    (sentence,) = (line for line in done.stdout.splitlines() if line.startswith("no settings do what is asked"))
+    (sentence,) = (line for line in done.stdout.splitlines() if line.startswith("no settings meet the requirements"))
     assert sentence.endswith(" in 300 trials: limit_cycle_margin >= 1.5 refused 300, before they were flown")
     assert runs_of(out) == {}
     assert not (out / "best.toml").exists()
@@ -170,7 +170,7 @@ def test_an_infeasible_search_says_what_refused_how_many_trials(file: Path, tmp_
     words = ("--subject-to", "range_error_peak_m < 1e-9", "--flights", 8, "--workers", 0)
     done = invoke("tune", file, "--out", tmp_path / "out", *OVER, *PEAK, *words)
     assert done.exit_code == 1
-    assert "no settings do what is asked in 4 trials: range_error_peak_m < 1e-09 refused 4\n" in done.stdout
+    assert "no settings meet the requirements in 4 trials: range_error_peak_m < 1e-09 refused 4\n" in done.stdout
     words = ("--subject-to", "bank_peak_deg < 45", "--flights", 8, "--workers", 0)
     done = invoke("tune", file, "--out", tmp_path / "out", *OVER, *PEAK, *words)
     assert "in 4 trials: bank_peak_deg < 45 (unknown) refused 4\n" in done.stdout

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def flights_of(places: Sequence[str]) -> dict[str, FlightLog]:
-    """The flights of `DIR:KEY` and `FILE.rrd`, by distinct names. Raises `BadInput`, of a folder with its flights."""
+    """The flights of `DIR:KEY` and `FILE.rrd`, by distinct names. Raises `BadInput`, for a folder with its flights."""
     from harness.cli._progress import progress
     from harness.runs.logs import distinctly_named
 
@@ -55,7 +55,7 @@ def recorded(path: Path) -> dict[str, FlightLog]:
 
 
 def choose_from(folder: Path, how: str) -> BadInput:
-    """What is said when a folder is named without a flight: its flights, and how one is chosen."""
+    """The error for a folder that is named without a flight: its flights, and how to choose one."""
     from harness.runs.journal import StoreError
     from harness.runs.results import load_results
 

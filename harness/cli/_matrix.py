@@ -43,7 +43,7 @@ def many_flights(workers: int, dask: str | None, retry: str | None, flight_timeo
 
 
 def processes(workers: int | None, flight_timeout: float | None, dask: str | None = None) -> int:
-    """The number of workers: one per processor unless told. BadInput for a time limit that cannot be kept."""
+    """The number of workers: one per processor by default. BadInput for a time limit that cannot be kept."""
     if workers is not None and dask is not None:
         raise BadInput("--workers is for processes of this machine, --dask has workers of its own: leave one out")
     if flight_timeout is not None and not flight_timeout > 0:
@@ -108,7 +108,7 @@ def print_time(size: Survey, done: int, workers: int, log: str | None) -> None:
 
 
 def engine_of(size: Survey, asked: str | None, times: float = 1.0) -> bool:
-    """Whether flights are compiled where they can be: see `engine_for`. Says which law of one's own is not."""
+    """Whether flights are compiled where they can be: see `engine_for`. Reports a user's law that is not."""
     from harness.runs.engine import engine_for
 
     with busy("compiling"):
@@ -134,7 +134,7 @@ def fly_matrix(matrix: Matrix, out: Path, options: Options) -> Progress:
 
 
 def flown_out(flying: Iterator[Progress], out: Path, first: str = "starting the workers") -> Progress:
-    """Flies on until all is done and shows how far it is, until then what is done `first`; Ctrl-C says what is kept."""
+    """Flies until all is done and shows the progress, `first` before it begins; on Ctrl-C reports what is kept."""
     import signal
 
     progress = None

@@ -1,4 +1,4 @@
-"""Standard output that nobody reads any more, or that has no room; characters that it or standard error cannot show."""
+"""Standard output that is closed or full; characters that it or standard error cannot encode."""
 
 import codecs
 import io
@@ -11,7 +11,7 @@ import click
 from harness.cli._input import BadInput
 
 _ANY_TEXT = "harness"  # the name under which Python knows `_encoded`
-CLOSED = 141  # the exit code of a program that SIGPIPE ends, as shells tell it
+CLOSED = 141  # the exit code of a program that SIGPIPE ends, as shells report it
 
 
 def guard() -> None:
@@ -44,7 +44,7 @@ def _encoded(error: UnicodeError) -> tuple[str | bytes, int]:
 
 
 class _Stderr(io.FileIO):
-    """What cannot be told ends no run."""
+    """Standard error whose failures are ignored, so that they do not end a run."""
 
     def write(self, content: Any) -> int:
         try:

@@ -1,4 +1,4 @@
-"""`harness adopt`: an aircraft from a JSBSim model that nobody here wrote."""
+"""`harness adopt`: an aircraft from a third-party JSBSim model."""
 
 import math
 from pathlib import Path
@@ -10,18 +10,28 @@ from harness.cli._paths import PATH
 
 @click.command()
 @click.argument("model")
-@click.option("--airspeed", type=click.FloatRange(min=1.0, max=1e4), help="m/s. [default: found from the lift]")
-@click.option("--altitude", type=click.FloatRange(min=20.0, max=3e4), default=1000.0, show_default=True, help="m.")
 @click.option(
-    "--max-bank", type=click.FloatRange(min=5.0, max=60.0), default=35.0, show_default=True, help="Degrees, in turns."
+    "--airspeed", type=click.FloatRange(min=1.0, max=1e4), help="Trim airspeed, m/s. [default: found from the lift]"
+)
+@click.option(
+    "--altitude", type=click.FloatRange(min=20.0, max=3e4), default=1000.0, show_default=True, help="Altitude, m."
+)
+@click.option(
+    "--max-bank",
+    type=click.FloatRange(min=5.0, max=60.0),
+    default=35.0,
+    show_default=True,
+    help="Bank limit in turns, degrees.",
 )
 @click.option(
     "--bandwidth",
     type=click.FloatRange(min=0.05, max=100.0),
-    help="rad/s, wanted of the bank's loop. [default: what the aircraft allows]",
+    help="Target bandwidth of the bank loop, rad/s. [default: what the aircraft allows]",
 )
-@click.option("--controls", type=PATH, help="A TOML file: elevator, aileron, rudder and throttle, names of properties.")
-@click.option("--out", type=PATH, default=Path(), show_default=True, help="Where the aircraft's folder is written.")
+@click.option(
+    "--controls", type=PATH, help="A TOML file that names the properties of elevator, aileron, rudder and throttle."
+)
+@click.option("--out", type=PATH, default=Path(), show_default=True, help="Write the aircraft's folder here.")
 def adopt(
     model: str,
     airspeed: float | None,
@@ -37,8 +47,8 @@ def adopt(
     derivatives, designs gains by one rule for all aircraft, flies a change of course by 90 deg and a circle, and
     identifies how the aircraft follows its commands. Prints a line for each stage. When all of it succeeds, the folder
     OUT/NAME is written: `aircraft = "OUT/NAME"` then flies it, and circle.toml in it is an experiment to begin with.
-    Otherwise the stage says why, and the exit code is 1. An aircraft that is not identified is adopted all the same,
-    without the plants lagged and coordinated. Takes some 10 s, a minute at most.
+    Otherwise the stage reports why, and the exit code is 1. An aircraft that cannot be identified is still adopted,
+    without the plants lagged and coordinated. Takes about 10 s, a minute at most.
 
     \b
     Examples:

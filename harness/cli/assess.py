@@ -1,4 +1,4 @@
-"""`harness assess`: what a log of a real flight says of the coordinated-flight assumption."""
+"""`harness assess`: judges the coordinated-flight assumption on the log of a real flight."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from harness.cli._paths import PATH
 @click.command()
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 @click.option("--map", "map_name", metavar="FILE.toml|NAME", help="Which column of a CSV is what; see the guide.")
-@click.option("--from", "begin", type=float, default=-math.inf, help="Leave out what comes before, s.")
-@click.option("--to", "end", type=float, default=math.inf, help="Leave out what comes after, s.")
+@click.option("--from", "begin", type=float, default=-math.inf, help="Ignore the log before this time, s.")
+@click.option("--to", "end", type=float, default=math.inf, help="Ignore the log after this time, s.")
 @click.option(
-    "--fit", type=PATH, metavar="FILE.toml", help="Write the aircraft of this flight: lagged and coordinated."
+    "--fit",
+    type=PATH,
+    metavar="FILE.toml",
+    help="Write an aircraft fitted to this flight, for the plants lagged and coordinated.",
 )
-@click.option("--airframe", metavar="NAME", help="Fly this airframe's 6-DOF model beside it: a name or a folder.")
+@click.option("--airframe", metavar="NAME", help="Fly this airframe's 6-DOF model for comparison: a name or a folder.")
 @click.option("--rrd", type=PATH, help="Write a Rerun recording to this file.")
-@click.option("--out", type=PATH, metavar="PAGE.html", help="Write what is said, with pictures, as one page.")
+@click.option("--out", type=PATH, metavar="PAGE.html", help="Write the assessment, with figures, as one HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 def assess(
     logs: tuple[Path, ...],
@@ -33,20 +36,20 @@ def assess(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Judge the assumption on the log of a real flight.
+    """Judge the coordinated-flight assumption on the log of a real flight.
 
     LOG is a ULog file (PX4), a DataFlash file (ArduPilot), or CSV files of one flight; a folder stands for the logs in
-    it. Prints each channel: how often its value really changes, since logs repeat rows; whether it was measured,
-    estimated by a filter, commanded or derived; and what is wrong with the log. Then what the flight says of each part
-    of the assumption, in the words and within the margins of harness compare, with an interval over independent windows
-    of flight; and what it cannot say, with the reason. The time is in seconds since the log's first row.
+    it. Prints each channel: its true update rate, since logs repeat rows; whether it was measured, estimated by a
+    filter, commanded or derived; and the defects of the log. Then the verdict on each part of the assumption, with the
+    terms and margins of harness compare and an interval over independent windows of flight; and what cannot be judged,
+    with the reason. The time is in seconds since the log's first row.
 
     With --airframe the 6-DOF model of that airframe is flown with the recorded bank, at the recorded airspeed and in
-    the recorded wind, and the same parts are told of it.
+    the recorded wind, and judged in the same way.
 
-    With --fit the response of bank or heading rate to its command is written to a file, which stands for an aircraft in
-    settings (aircraft = "FILE.toml"): fly and predict take it on the plant lagged, and on coordinated where the log has
-    a bank command. A log that does not tell the response is refused.
+    With --fit the identified response of bank or heading rate to its command is written to a file, which stands for an
+    aircraft in settings (aircraft = "FILE.toml"): fly and predict use it on the plant lagged, and on coordinated where
+    the log has a bank command. It is refused if the log does not excite the response enough.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""`harness check`: is a settings file right, or a law of one's own?"""
+"""`harness check`: checks a settings file, or a user-defined law."""
 
 from pathlib import Path
 
@@ -17,9 +17,9 @@ def check(file: Path, overrides: tuple[str, ...]) -> None:
     """Check a settings file, or a law of your own, without flying it.
 
     Prints every mistake with its line, what is wrong and what is allowed; the warnings; and whether the circle can be
-    held. Every flight of a matrix is checked. Of a law, FILE.py or FILE.py:CLASS, it prints whether each command is
-    finite and limited, the same each time and mirrored in a mirrored world, whether two flights at once know of each
-    other, and what a command costs.
+    held. Every flight of a matrix is checked. For a law, FILE.py or FILE.py:CLASS, it prints whether each command is
+    finite, limited, reproducible and mirrored in a mirrored world, whether two simultaneous flights are independent,
+    and the computing time of a command.
 
     \b
     Examples:

@@ -41,16 +41,16 @@ def compare(
     """Compare the flights of a run that differ in one setting alone.
 
     DIR is a folder that `harness run` wrote. The setting is the plant where several were flown, else the law or the
-    first that varies; --by names another. Of two or more folders, the same flights in each are compared: what other
-    code or other settings moved, by how much, and which flights. Prints how the flights of each combination ended, a
+    first that varies; --by names another. With two or more folders, the same flights in each are compared: what
+    changed with other code or settings, by how much, and in which flights. Prints the outcomes of each combination, a
     map where two numeric settings vary, and for each airframe which part of the coordinated-flight assumption holds
     within its margin, or which metrics differ, with 95 % intervals. The margins are the table [assess] of the
     experiment's file, see `harness list margins`.
 
     With --variance-reduction the flights of the cheaper plants narrow the intervals of the highest plant's own means
-    and shares: both have to be flown with the same seeds, and a cheaper one with many more (fly FILE into DIR again
-    with --set plant and --set seed). Prints both intervals, and the factor of flights and of time that this saves,
-    where it saves 2 or more of the flights.
+    and shares (control variates): both must be flown with the same seeds, and a cheaper one with many more (fly FILE
+    into DIR again with --set plant and --set seed). Prints both intervals, and the factors by which this reduces
+    flights and time, where the factor of flights is 2 or more.
 
     \b
     Examples:

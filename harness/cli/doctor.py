@@ -10,7 +10,7 @@ def doctor() -> None:
     Prints a table of what was checked, with "ok", "MISSING" or "BAD", and whether the installation is sound. Packages
     are loaded, and the viewer's program is started. Each airframe is flown in JSBSim to check wind and units. Thirty
     stored flights are flown anew: where another processor or another version of a library moves their last bits, the
-    table says by how much, and what is not as it was. Exit code 1 when a check fails.
+    table reports by how much, and which results changed. Exit code 1 when a check fails.
 
     \b
     Example:

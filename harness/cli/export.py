@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 def export(what: str, kind: str, flight: str | None, out: Path | None) -> None:
     """Write the log of a flight, or the flights of a run, as a table.
 
-    CSV or Parquet. Of a flight: one row for each guidance period; SI units, rad, north-east-down; a cell is empty where
-    the plant has no such quantity. CSV has every digit of a double. A flight of a run without a recording is flown
-    again and compared with what is stored. Of DIR, a folder that `harness run` wrote: one row for each flight, with its
-    settings and metrics; the unit is the suffix of a column, and in Parquet in its metadata too. Prints the file, its
-    rows and its columns.
+    CSV or Parquet. For a flight: one row for each guidance period; SI units, rad, north-east-down; a cell is empty
+    where the plant has no such quantity. CSV has every digit of a double. A flight of a run without a recording is
+    flown again and compared with the stored result. For DIR, a folder that `harness run` wrote: one row for each
+    flight, with its settings and metrics; the unit is the suffix of a column, and in Parquet in its metadata too.
+    Prints the file, its rows and its columns.
 
     \b
     Examples:

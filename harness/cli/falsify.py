@@ -16,7 +16,7 @@ _MOST_LINES = 5  # of the table of the worst
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--over", multiple=True, required=True, metavar="KEY=LO:HI", help="Search this setting; repeatable.")
-@click.option("--requirement", "asked", required=True, metavar="'NAME OP VALUE'", help="What a flight is to break.")
+@click.option("--requirement", "asked", required=True, metavar="'NAME OP VALUE'", help="The requirement to violate.")
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="The folder of the results.")
 @click.option(
     "--flights", type=click.IntRange(1), default=200, show_default=True, metavar="N", help="At most N flights."
@@ -27,13 +27,23 @@ _MOST_LINES = 5  # of the table of the worst
     type=click.Choice(["kinematic", "lagged", "coordinated", "none"]),
     help="Search this cheaper plant first, as a guide. [default: coordinated for 6-DOF flights]",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search, not of the flights.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Random seed of the search; flights keep their own.",
+)
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
-@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+    "--retry",
+    type=click.Choice(["failed"]),
+    help="Fly invalid flights again; timed-out flights and dead workers always are.",
+)
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
 )
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the text.")
@@ -53,19 +63,18 @@ def falsify(
     flight_timeout: float | None,
     as_json: bool,
 ) -> None:
-    """Search for the flight that breaks a requirement most.
+    """Search for the flight that violates a requirement most.
 
-    The requirement is NAME OP VALUE: a metric, or the outcome, against a value. How robust a flight is, is its distance
-    from that value over the value; below 0 it breaks the requirement. What a flight does not have breaks it as well.
-    Each trial is flown over all flights of the [matrix] of FILE, and judged by the worst of them; a key that is
-    searched is no axis of it.
+    The requirement is NAME OP VALUE: a metric, or the outcome, against a value. Robustness is the margin to the value,
+    divided by the value; negative means violated. A missing value counts as violated. Each trial flies all flights of
+    the [matrix] of FILE and is judged by the worst of them; a searched key must not be an axis of the [matrix].
 
-    A search of 6-DOF flights begins with 64 trials on a cheaper plant, which do not count among the N flights. Where
-    they do worst is where it looks first, and, as far as its own flights bear that out, next.
+    A search of 6-DOF flights begins with 64 trials on a cheaper plant, which do not count among the N flights. Their
+    result is the prior mean of the search, weighted by how well it predicts the flights on the plant itself.
 
-    At least every fourth trial is a uniform draw from the ranges (of their logarithms, where a positive range of a
-    decade or more is searched by factors). They give a 95 % upper bound on the share of the ranges that breaks the
-    requirement. That none was found proves nothing.
+    At least every fourth trial is drawn uniformly from the ranges (a positive range of a decade or more on a
+    logarithmic scale). These trials give a 95 % upper bound on the share of the valid settings in the ranges that
+    violates the requirement, for a number of flights fixed in advance. A search that finds no violation is no proof.
 
     Writes OUT/counterexample.toml, which `harness fly` and `harness view` take, and OUT/trials.csv. The result does
     not depend on the number of workers. The same command resumes an interrupted search, and goes on with more

@@ -120,7 +120,7 @@ def fly(
 
 
 def log_of(flight: Flight, stream: Live | None = None) -> FlightLog:
-    """The flight flown: by itself, or where its law is the user's or its aircraft another's, so that it cannot hang."""
+    """The flight, flown. A user's law or a third-party model is watched or isolated, so that it cannot hang."""
     from harness.checks import model_of_another
     from harness.runs import apart
     from harness.settings.laws import source_of
@@ -186,7 +186,7 @@ def _recalled(place: RowAddress) -> Recalled:
 
 
 def _compare(recalled: Recalled, result: FlightResult) -> None:
-    """Says whether the flight is the stored one, to the last bit."""
+    """Reports whether the flight is bit-identical to the stored one."""
     from harness.runs.recall import deviation
 
     if not recalled.digest:

@@ -9,17 +9,17 @@ from harness.cli._paths import PATH
 
 @click.command()
 @click.argument("aircraft")
-@click.option("--airspeed", type=float, help="m/s. [default: the airspeed that the inner loop was tuned at]")
-@click.option("--out", type=PATH, default=Path("out/identify"), show_default=True)
-@click.option("--keep", is_flag=True, help="Keep the parameters beside the airframe too: plants fly by them.")
+@click.option("--airspeed", type=float, help="Airspeed, m/s. [default: the inner loop's design airspeed]")
+@click.option("--out", type=PATH, default=Path("out/identify"), show_default=True, help="Write the results here.")
+@click.option("--keep", is_flag=True, help="Keep the parameters beside the airframe too; the plants use them.")
 def identify(aircraft: str, airspeed: float | None, out: Path, keep: bool) -> None:
     """Identify how an airframe follows a heading-rate command.
 
     AIRCRAFT is a name or a folder. Flies steps and sweeps of the heading-rate command on the 6-DOF plant and fits the
     plants `lagged` and `coordinated` to them. Prints the step and frequency response, the fit, and its errors on
     manoeuvres that the fit did not use. The parameters, a step plot and a Bode plot are written to OUT; with --keep the
-    parameters are kept in identified.toml beside the airframe too, for each airspeed. Takes 10 s on a quick machine and
-    a minute on a slow or busy one; how long is left is said on the way. `harness adopt` does it, too.
+    parameters are kept in identified.toml beside the airframe too, for each airspeed. Takes 10 s to a minute; progress
+    and remaining time are shown. `harness adopt` includes this step.
 
     \b
     Examples:

@@ -24,7 +24,7 @@ _PICTURES = ("map.png", PICTURE)
     default="converged",
     show_default=True,
     metavar="METRIC|outcome|'NAME OP VALUE'",
-    help="What is asked of each flight.",
+    help="What is evaluated for each flight.",
 )
 @click.option(
     "--resolution", type=int, default=200, show_default=True, metavar="N", help="Locate borders to 1/N of a range."
@@ -39,9 +39,13 @@ _PICTURES = ("map.png", PICTURE)
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
-@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+    "--retry",
+    type=click.Choice(["failed"]),
+    help="Fly invalid flights again; timed-out flights and dead workers always are.",
+)
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
 )
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 def map_(
@@ -62,16 +66,17 @@ def map_(
     """Map where the answer changes over two settings.
 
     Flies a coarse lattice, and then only where the answer changes. Each combination of the [matrix] of FILE, such as
-    each plant, is a panel of its own; flights that differ in the seed alone answer together: the most frequent answer,
-    of a number the median. A key of the map is no axis of the [matrix]; `wind.steady_mps.north` is one component of a
-    vector. A positive range of a decade or more is divided by factors.
+    each plant, is a separate panel. Flights that differ only in the seed are combined: the median for a numeric
+    metric, otherwise the most frequent answer. A key of the map must not be an axis of the [matrix];
+    `wind.steady_mps.north` is one component of a vector. A positive range of a decade or more is divided
+    logarithmically.
 
-    Asked is whether the flight has a convergence time (converged), its outcome, a metric, or whether it does NAME OP
-    VALUE, as in 'range_error_peak_m < 5'. Of a number the border is where it jumps by a tenth of its reach. What lies
-    between the points of the coarse lattice, with the default resolution narrower than 1/18 of a range, may be missed:
-    see the guide.
+    The answer is whether the flight converges (converged), its outcome, a metric, or whether it satisfies NAME OP
+    VALUE, as in 'range_error_peak_m < 5'. For a numeric metric a border is drawn where neighbouring points differ by
+    more than a tenth of its range. A feature that lies between the points of the coarse lattice (with the default
+    resolution, narrower than 1/18 of a range) may be missed: see the guide.
 
-    Prints how much of each panel has which answer and how many flights it took. Writes OUT/map.png and OUT/map.svg,
+    Prints the share of each answer in each panel and the number of flights. Writes OUT/map.png and OUT/map.svg,
     which `harness report` shows, OUT/points.csv and OUT/border.csv. The result does not depend on the number of
     workers. The same command resumes an interrupted map; the flights are rows of OUT as of `harness run`.
 

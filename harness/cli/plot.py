@@ -23,9 +23,9 @@ _MAP = "map"
 @click.option(
     "--save", type=click.Path(path_type=Path), required=True, metavar="FILE", help="The figure: .png, .svg or .pdf."
 )
-@click.option("--metric", metavar="METRIC", help="Of --what map.  [default: range_error_rms_m]")
+@click.option("--metric", metavar="METRIC", help="The metric of --what map.  [default: range_error_rms_m]")
 @click.option(
-    "--where", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Of --what map: only flights with this setting."
+    "--where", multiple=True, type=SETTING, metavar="KEY=VALUE", help="With --what map: only flights with this setting."
 )
 def plot(
     places: tuple[str, ...], what: tuple[str, ...], save: Path, metric: str | None, where: tuple[str, ...]
@@ -33,9 +33,9 @@ def plot(
     """Draw flights, or a map of a run, as a figure in print size.
 
     Flights, up to six: track, |range error| on a log scale, heading rate, bank and sideslip, and the spectrum of the
-    command; without --what all of them, of more than two flights the clearest. A flight of a run without a recording is
-    flown again. With --what map: a metric of all flights of DIR over the two numeric settings of most values. The
-    colours suit colour-blind eyes. Prints the file and what it shows.
+    command; without --what all of them, for more than two flights a selection. A flight of a run without a recording
+    is flown again. With --what map: a metric of all flights of DIR over the two numeric settings with most values. The
+    colours suit colour-blind eyes. Prints the file and its content.
 
     \b
     Examples:

@@ -45,7 +45,7 @@ def report(
 ) -> None:
     """Write the comparison as one HTML page with figures.
 
-    The page says what `harness compare` prints of the same folders, fetches nothing, and suits a browser and paper.
+    The page contains what `harness compare` prints for the same folders, is self-contained, and can be printed.
     Prints the name of the file.
 
     \b

@@ -18,8 +18,8 @@ def reproduce(out: Path, sixdof: bool, workers: int | None) -> None:
     """Fly the paper's simulations and check its claims.
 
     Prints the numbers of the paper beside ours, then each claim with its verdict. OUT/paper.html holds both with the
-    figures, OUT/claims.md says what is left of the claims, OUT/claims.csv gives each claim with its numbers; with
-    --sixdof OUT/claims_sixdof.md says what is left of them on the airframes. Takes two to five minutes.
+    figures, OUT/claims.md summarises which claims hold, OUT/claims.csv gives each claim with its numbers; with
+    --sixdof OUT/claims_sixdof.md summarises which hold on the airframes. Takes two to five minutes.
 
     \b
     Examples:

@@ -38,9 +38,13 @@ if TYPE_CHECKING:
     metavar="KEY=VALUE",
     help="Set a key, or several values of it; repeatable.",
 )
-@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+    "--retry",
+    type=click.Choice(["failed"]),
+    help="Fly invalid flights again; timed-out flights and dead workers always are.",
+)
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
 )
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--dry-run", is_flag=True, help="Print the size of the matrix, its warnings and the time it takes.")

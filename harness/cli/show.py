@@ -25,16 +25,16 @@ _MARK = "*"
 )
 @click.option("--sort", metavar="COLUMN", help="Sort by a metric or setting; -COLUMN: the largest first.")
 @click.option("--columns", metavar="A,B", help="Print these metrics and settings.  [default: what varies, and metrics]")
-@click.option("--limit", type=click.IntRange(1), metavar="N", help="Print N flights.  [default: 100; of --csv all]")
+@click.option("--limit", type=click.IntRange(1), metavar="N", help="Print N flights.  [default: 100; with --csv all]")
 @click.option("--csv", "as_csv", is_flag=True, help="Print CSV: every column unless --columns names some.")
 def show(
     row: str, where: tuple[str, ...], sort: str | None, columns: str | None, limit: int | None, as_csv: bool
 ) -> None:
     """Show the flights of a run, or one of them in full.
 
-    Of DIR, a folder that `harness run` wrote, prints a table of the flights: the key, the settings that vary, the
-    outcome and the metrics. Of DIR:KEY prints one flight: how it ended, its metrics, its settings and where it comes
-    from. The beginning of the key is enough.
+    For DIR, a folder that `harness run` wrote, prints a table of the flights: the key, the settings that vary, the
+    outcome and the metrics. For DIR:KEY prints one flight: how it ended, its metrics, its settings and its provenance.
+    The beginning of the key is enough.
 
     \b
     Examples:
@@ -96,7 +96,7 @@ def _sorted(flights: pd.DataFrame, column: str | None) -> pd.DataFrame:
 
 
 def _named(flights: pd.DataFrame, columns: str | None) -> list[str]:
-    """The columns that were asked for, after the key; empty for none."""
+    """The requested columns, after the key; empty for none."""
     if columns is None:
         return []
     return ["key", *_known(flights, [name.strip() for name in columns.split(",")], "--columns")]

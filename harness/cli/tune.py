@@ -22,7 +22,11 @@ _MOST_LINES = 30  # of a front
     "--minimise", "goals", multiple=True, required=True, metavar="METRIC", help="What to minimise; twice: a front."
 )
 @click.option(
-    "--subject-to", "required", multiple=True, metavar="'NAME OP VALUE'", help="Ask this of every flight; repeatable."
+    "--subject-to",
+    "required",
+    multiple=True,
+    metavar="'NAME OP VALUE'",
+    help="Require this of every flight; repeatable.",
 )
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="The folder of the results.")
 @click.option(
@@ -33,15 +37,25 @@ _MOST_LINES = 30  # of a front
     type=click.Choice(["worst", "mean"]),
     default="worst",
     show_default=True,
-    help="Of a metric over the conditions.",
+    help="How a metric is aggregated over the conditions.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search, not of the flights.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Random seed of the search; flights keep their own.",
+)
 @click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
 @click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
-@click.option("--retry", type=click.Choice(["failed"]), help="Fly the flights again that are invalid.")
 @click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="What flies. [default: compiled where that is quicker]"
+    "--retry",
+    type=click.Choice(["failed"]),
+    help="Fly invalid flights again; timed-out flights and dead workers always are.",
+)
+@click.option(
+    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
 )
 @click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 def tune(
@@ -62,14 +76,14 @@ def tune(
 ) -> None:
     """Search for the settings that do best.
 
-    Each trial is flown over all flights of the [matrix] of FILE, its conditions, with the same seeds; a key that is
-    searched is no axis of it. Minimised is the worst over the conditions of a metric, or of its distance from its ideal
-    value. What is asked of every flight is NAME OP VALUE: a metric, the outcome, or what is known beforehand
-    (limit_cycle_margin, feasibility_margin_deg_s, ...) against a value. A flight has to last, and to keep 1.5 times
-    away from the limit cycle where that is known, unless --subject-to says otherwise of `outcome` and
-    `limit_cycle_margin`. Settings that miss what is known beforehand are not flown.
+    Each trial flies all flights of the [matrix] of FILE, its conditions, with the same seeds; a searched key must not
+    be an axis of the [matrix]. The objective is the worst value of a metric over the conditions, or the worst distance
+    from its ideal value. A constraint on every flight is NAME OP VALUE: a metric, the outcome, or a quantity that is
+    predicted without a flight (limit_cycle_margin, feasibility_margin_deg_s, ...) against a value. By default the
+    outcome must be `completed` and limit_cycle_margin at least 1.5 (ignored where it cannot be predicted);
+    --subject-to on either replaces its default. Settings that violate a predicted constraint are not flown.
 
-    Prints the best settings, what they reach and what keeps them from more. Writes OUT/best.toml, which `harness fly`
+    Prints the best settings, their results and the active constraints. Writes OUT/best.toml, which `harness fly`
     takes, and OUT/trials.csv. With two metrics there is a file for each point of the front: best_1.toml, ... The result
     does not depend on the number of workers. The same command resumes an interrupted search, and goes on with more
     --flights; the flights are rows of OUT as of `harness run`.
@@ -112,7 +126,7 @@ def tune(
         with many_flights(workers, dask, retry, flight_timeout) as options:
             options = replace(options, typical=typical, compiled=engine_of(middle, engine, trials))
             progress = flown_out(
-                search.fly(out, options), out, "looking for settings that meet what is known beforehand"
+                search.fly(out, options), out, "looking for settings that meet the predicted constraints"
             )
         with busy("writing the table of flights"):
             export(out)
@@ -144,7 +158,7 @@ def _requirements(texts: Sequence[str]) -> list[Requirement]:
 
 
 def _print_search(search: Tuning) -> None:
-    """What is searched, and what is asked; a warning where the margin to the limit cycle is unknown."""
+    """The searched settings and the constraints; a warning where the margin to the limit cycle is unknown."""
     from collections import Counter
 
     from harness.limit_cycle.predicted import MARGIN, why_unknown
@@ -153,16 +167,16 @@ def _print_search(search: Tuning) -> None:
     click.echo("every trial flies these; searched:")
     for dimension in search.space.dimensions:
         click.echo(f"  {dimension}{', by factors' if dimension.is_log else ''}")
-    click.echo(f"asked of every flight: {', '.join(map(str, search.requirements))}")
+    click.echo(f"required of every flight: {', '.join(map(str, search.requirements))}")
     if any(one.name == MARGIN and one.where_known for one in search.requirements):
         reasons = Counter(filter(None, map(why_unknown, search.space.middle.flights)))
         for reason, count in reasons.items():
             of = f"{count} of {counted(len(search.space.conditions), 'flight')}"
-            click.echo(f"warning: {MARGIN} is unknown in {of} and not asked there: {reason}", err=True)
+            click.echo(f"warning: {MARGIN} is unknown in {of} and not required there: {reason}", err=True)
 
 
 def _print_found(search: Tuning, files: Sequence[Path]) -> None:
-    """The best settings, what they reach, what refused the others, and what keeps the best from more."""
+    """The best settings, their results, why the others were refused, and the active constraints of the best."""
     from harness.tables import counted, table
 
     refusals = "; ".join(
@@ -170,7 +184,7 @@ def _print_found(search: Tuning, files: Sequence[Path]) -> None:
         for what, (count, before) in search.refusals.items()
     )
     if not files:
-        click.echo(f"no settings do what is asked in {counted(len(search.attempts), 'trial')}: {refusals}")
+        click.echo(f"no settings meet the requirements in {counted(len(search.attempts), 'trial')}: {refusals}")
         return
     for line in table(*_front(search)):
         click.echo(line)

@@ -11,9 +11,11 @@ from harness.cli._paths import PATH
 
 @click.command()
 @click.argument("airframe")
-@click.option("--with", "logs", metavar="LOG", multiple=True, required=True, type=PATH, help="A flight; repeatable.")
+@click.option(
+    "--with", "logs", metavar="LOG", multiple=True, required=True, type=PATH, help="The log of a flight; repeatable."
+)
 @click.option("--map", "map_name", metavar="FILE.toml|NAME", help="Which column of a CSV is what; see the guide.")
-@click.option("--save", type=PATH, metavar="FILE.svg|.png|.pdf", help="Draw the curves of both.")
+@click.option("--save", type=PATH, metavar="FILE.svg|.png|.pdf", help="Draw recorded and simulated curves.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def validate(airframe: str, logs: tuple[Path, ...], map_name: str | None, save: Path | None, as_json: bool) -> None:
     """Replay the recorded surface commands of a flight on an airframe's model.
@@ -21,7 +23,7 @@ def validate(airframe: str, logs: tuple[Path, ...], map_name: str | None, save: 
     AIRFRAME is a name or a folder. From starts along each flight the model begins where the aircraft was, in the wind
     of the log and without the inner loop, and is given the surfaces and the throttle that were commanded. Prints how
     much of the variance of rates and attitude it explains over 1, 2 and 3 s: as recorded, and with the offsets of the
-    surfaces and the delay that fit best, since a log tells neither its surfaces' zero nor its clock's.
+    surfaces and the delay that fit best, since a log contains neither the surfaces' zero nor the delay of its clock.
 
     \b
     Examples:

@@ -80,7 +80,7 @@ def view(what: str | None, flights: tuple[str, ...], pair: str | None, save: Pat
 
 
 def _logs(what: str, flights: tuple[str, ...], pair: str | None) -> dict[str, FlightLog] | None:
-    """The flights asked for, by name; None: all of a recording, as it is."""
+    """The requested flights, by name; None: all of a recording, as it is."""
     from harness.cli._flights import say
     from harness.cli._input import BadInput
     from harness.review.styled import MOST

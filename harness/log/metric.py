@@ -22,7 +22,7 @@ from harness.series import overshoot, peak, rms
 Array = NDArray[np.float64]
 Value = (
     float | bool | None
-)  # None, or NaN from `Metric.measure`: there is no such thing, or this flight tells nothing of it
+)  # None, or NaN from `Metric.measure`: the plant has no such quantity, or the flight does not excite it
 
 YES_OR_NO = "yes/no"  # the unit of a metric that is true or false
 
@@ -70,12 +70,12 @@ def measure(log: FlightLog) -> dict[str, float | bool | None]:
 
 
 def _known(value: Value) -> Value:
-    """None in place of what is not finite: the plant has no such thing."""
+    """The value, or None if it is not finite: the plant has no such quantity."""
     return value if value is None or math.isfinite(value) else None
 
 
 def window_in_words(metrics: Mapping[str, Value]) -> str:
-    """Over which part of a flight its circling was judged, by the metrics; empty of a flight without a row."""
+    """The window in which circling was judged, in words, from the metrics; empty for a flight without a row."""
     begin, end, laps = (metrics.get(name) for name in ("window_begin_s", "window_end_s", "window_laps"))
     if begin is None or end is None:
         return ""
@@ -129,7 +129,7 @@ def _limit_cycle_amplitude(signals: Signals) -> float | None:
 
 
 def _averaged(x: Array, samples: float) -> Array:
-    """A centred moving average: it delays nothing."""
+    """A centred moving average, without delay."""
     window = np.ones(max(1, round(samples)))
     return np.convolve(x, window / window.size, mode="valid") if len(x) >= window.size else x
 
@@ -138,7 +138,7 @@ _METRICS = (
     Metric(
         name="convergence_time_s",
         unit="s",
-        meaning="first time after which |range error| stays below the tolerance, 5 s at least, on the way round",
+        meaning="settling time: from then to the end, 5 s or more, |range error| < tolerance while circling the target",
         measure=lambda signals: signals.settling_time(),
         heading="convergence time",
         in_short_tables=True,
@@ -147,7 +147,7 @@ _METRICS = (
     Metric(
         name="infeasible_s",
         unit="s",
-        meaning="time with a negative feasibility margin: air and target ask more than the limit of the command",
+        meaning="time in which holding the circle requires more than the command limit (negative feasibility margin)",
         measure=lambda signals: float(np.sum(signals.log["feasibility_margin"][:-1] < 0.0)) * signals.period,
         heading="infeasible",
         compared=False,
@@ -155,7 +155,7 @@ _METRICS = (
     Metric(
         name="convergence_time_half_tolerance_s",
         unit="s",
-        meaning="convergence time at half the tolerance; a difference that changes sign with it rests on the tolerance",
+        meaning="settling time at half the tolerance; if it reverses the ranking of two laws, the tolerance decides",
         measure=lambda signals: signals.settling_time(0.5),
         heading="convergence time",
         statistic="at half the tolerance",
@@ -165,7 +165,7 @@ _METRICS = (
     Metric(
         name="convergence_time_double_tolerance_s",
         unit="s",
-        meaning="the same for twice the tolerance",
+        meaning="settling time at twice the tolerance",
         measure=lambda signals: signals.settling_time(2.0),
         heading="convergence time",
         statistic="at twice the tolerance",
@@ -175,7 +175,7 @@ _METRICS = (
     Metric(
         name="window_begin_s",
         unit="s",
-        meaning="circling is judged from then: the last whole laps after convergence, else see window_laps",
+        meaning="begin of the judged window: the last whole laps after convergence, else see window_laps",
         measure=lambda signals: float(signals.circling("time")[0]),
         heading="judged from",
         compared=False,
@@ -183,7 +183,7 @@ _METRICS = (
     Metric(
         name="window_end_s",
         unit="s",
-        meaning="circling is judged until then",
+        meaning="end of the judged window",
         measure=lambda signals: float(signals.circling("time")[-1]),
         heading="judged until",
         compared=False,
@@ -191,7 +191,7 @@ _METRICS = (
     Metric(
         name="window_laps",
         unit="1",
-        meaning="whole laps judged; 0: less than one is left after convergence; none: the last half, not settled",
+        meaning="whole laps in that window; 0: less than one after convergence; none: the last half of the flight",
         measure=lambda signals: None if signals.window.laps is None else float(signals.window.laps),
         heading="laps judged",
         compared=False,
@@ -199,7 +199,7 @@ _METRICS = (
     Metric(
         name="laps",
         unit="1",
-        meaning="times that the aircraft goes round the target, over the whole flight",
+        meaning="laps around the target over the whole flight",
         measure=lambda signals: abs(float(signals.around[-1] - signals.around[0])) / math.tau,
         heading="laps",
         compared=False,
@@ -207,7 +207,7 @@ _METRICS = (
     Metric(
         name="goes_round",
         unit=YES_OR_NO,
-        meaning="whether, while circling is judged, it goes round in at most ten times the time of still air",
+        meaning="true if the mean angular rate around the target in the judged window is at least a tenth of V / R_d",
         measure=lambda signals: signals.goes_round(signals.window.first),
         heading="goes round",
         compared=False,
@@ -224,7 +224,7 @@ _METRICS = (
     Metric(
         name="range_error_rms_m",
         unit="m",
-        meaning="range error while circling is judged",
+        meaning="range error in the judged window",
         measure=lambda signals: rms(signals.circling("range_error")),
         heading="settled error",
         statistic="rms",
@@ -234,7 +234,7 @@ _METRICS = (
     Metric(
         name="range_error_peak_m",
         unit="m",
-        meaning="largest |range error| while circling is judged",
+        meaning="largest |range error| in the judged window",
         measure=lambda signals: peak(signals.circling("range_error")),
         heading="settled error",
         statistic="peak",
@@ -253,7 +253,7 @@ _METRICS = (
     Metric(
         name="saturation_fraction",
         unit="1",
-        meaning="share of the time with the command at its limit, while circling is judged",
+        meaning="share of time in which the command saturates, in the judged window",
         measure=_saturation,
         heading="saturation",
         statistic="share",
@@ -265,7 +265,7 @@ _METRICS = (
     Metric(
         name="command_activity_deg_s2",
         unit="deg/s2",
-        meaning="total variation of the command per second, while circling is judged",
+        meaning="total variation of the command per second, in the judged window",
         measure=_activity,
         heading="command activity",
         in_short_tables=True,
@@ -274,7 +274,7 @@ _METRICS = (
     Metric(
         name="chatters",
         unit=YES_OR_NO,
-        meaning="whether a limit cycle shows; null where gusts may hide one, or where the judged time is below 30 s",
+        meaning="true if a limit cycle is detected; null if gusts may mask one or the judged window is below 30 s",
         measure=lambda signals: signals.chatters,
         heading="limit cycle",
         of_circling=True,
@@ -290,7 +290,7 @@ _METRICS = (
     Metric(
         name="limit_cycle_amplitude_deg_s",
         unit="deg/s",
-        meaning="half of peak to peak of the flown heading rate in that limit cycle; 0 without one",
+        meaning="amplitude (half of peak to peak) of the flown heading rate in that limit cycle; 0 without one",
         measure=_limit_cycle_amplitude,
         heading="limit cycle",
         statistic="amplitude",
@@ -307,7 +307,7 @@ _METRICS = (
     Metric(
         name="heading_rate_lag_s",
         unit="s",
-        meaning="delay at which the flown heading rate matches the commanded one best",
+        meaning="delay of the flown behind the commanded heading rate, by least squares",
         measure=lambda signals: signals.lag_and_gain[0],
         heading="heading-rate lag",
     ),
@@ -339,7 +339,7 @@ _METRICS = (
     Metric(
         name="bank_reserve_deg",
         unit="deg",
-        meaning="bank limit of the inner loop that flew, less the bank of a coordinated turn at the heading-rate limit",
+        meaning="bank limit of the inner loop minus the bank of a coordinated turn at the heading-rate limit",
         measure=_bank_reserve,
         heading="bank in reserve",
     ),
@@ -363,7 +363,7 @@ _METRICS = (
     Metric(
         name="lateral_acceleration_rms_mps2",
         unit="m/s2",
-        meaning="specific force along the wing; none in a coordinated turn",
+        meaning="lateral specific force (body y); zero in a coordinated turn",
         measure=lambda signals: rms(signals.log["lateral_acceleration"]),
         heading="lateral acceleration",
         statistic="rms",

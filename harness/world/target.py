@@ -30,10 +30,10 @@ class TargetState(NamedTuple):
 class Segment:
     """An interval in which the target accelerates, turns, or both. Overlapping segments add up."""
 
-    from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
-    to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
-    acceleration: Annotated[MetresPerSecond2, Ge(-100), Le(100), About("rate of the speed")] = 0.0
-    turn_rate: Annotated[DegreesPerSecond, Ge(-_FASTEST_TURN), Le(_FASTEST_TURN), About("clockwise")] = 0.0
+    from_: Annotated[Seconds, Ge(0), Le(1e6), About("begin")]
+    to: Annotated[Seconds, Ge(0), Le(1e6), About("end")]
+    acceleration: Annotated[MetresPerSecond2, Ge(-100), Le(100), About("along-track acceleration")] = 0.0
+    turn_rate: Annotated[DegreesPerSecond, Ge(-_FASTEST_TURN), Le(_FASTEST_TURN), About("turn rate, clockwise")] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ class Target:
     position: Annotated[tuple[Metres, Metres], About("north, east of the origin")] = (10.0, 10.0)
     speed: Annotated[MetresPerSecond, Ge(0), About("initial speed")] = 0.0
     heading: Annotated[Degrees, About("initial direction, clockwise from north")] = 0.0
-    segments: Annotated[tuple[Segment, ...], About("manoeuvres")] = ()
+    segments: Annotated[tuple[Segment, ...], About("manoeuvres: intervals of constant acceleration and turn rate")] = ()
     track: Annotated[str | None, About("a recorded track instead, a CSV: time_s, north_m, east_m")] = None
 
     def start(self) -> Callable[[float], TargetState]:

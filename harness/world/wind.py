@@ -26,9 +26,9 @@ LOWEST, HIGHEST = 3.048, 304.8  # m, 10 and 1000 ft above ground: where the turb
 class Gust:
     """A discrete gust of the shape (1 - cos)/2: it rises and falls back to zero within its interval."""
 
-    from_: Annotated[Seconds, Ge(0), Le(1e6), About("when it begins")]
-    to: Annotated[Seconds, Ge(0), Le(1e6), About("when it ends")]
-    velocity: Annotated[tuple[_Gusty, _Gusty, _Gusty], About("at its peak: the air moves towards north, east, down")]
+    from_: Annotated[Seconds, Ge(0), Le(1e6), About("begin")]
+    to: Annotated[Seconds, Ge(0), Le(1e6), About("end")]
+    velocity: Annotated[tuple[_Gusty, _Gusty, _Gusty], About("peak velocity of the air: north, east, down")]
 
     def at(self, time: Array) -> Array:
         """The gust at these times, s: shape (len(time), 3), m/s towards north, east, down."""
@@ -49,7 +49,7 @@ class Wind:
     ] = (0.0, 0.0)
     gusts: Annotated[tuple[Gust, ...], About("discrete gusts, (1 - cos)/2; overlapping ones add up")] = ()
     turbulence: Annotated[str, OneOf(tuple(SEVERITIES)), About("MIL-F-8785C, low altitude")] = "none"
-    rotation: Annotated[bool, About("the turbulence also turns the air over a 6-DOF aircraft's wing")] = True
+    rotation: Annotated[bool, About("include the rotational turbulence p_g, q_g, r_g on a 6-DOF aircraft")] = True
 
     def gust(self, time: Array) -> Array:
         """The sum of the discrete gusts at these times, s: shape (len(time), 3), m/s towards north, east, down."""
