@@ -1,6 +1,6 @@
-"""The ladder of plants: each adds one thing to the one before it, from Eq. (1) to six degrees of freedom.
+"""The ladder of plants: each adds one effect to the one before it, from Eq. (1) to six degrees of freedom.
 
-A plant is one file beside this one and one entry of `PLANTS`; no other code asks for a plant by name.
+A plant is one file beside this one and one entry of `PLANTS`; tables, help and references follow from the entry.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ _FOLDER = Path(__file__).parent
 
 
 class Setup(NamedTuple):
-    """What a plant is made from."""
+    """The inputs from which a plant is made."""
 
     airframe: Path  # the airframe's folder
     airspeed: float  # nominal, m/s
@@ -51,7 +51,7 @@ class PlantKind:
     about: str  # one sentence
     adds: str  # what it adds to the rung below, as a noun phrase
     make: Callable[[Setup], Plant]  # raises `PlantError`
-    at_once: bool = False  # whether the heading rate follows its command at once
+    at_once: bool = False  # whether the heading rate equals its command, without lag
     has_body: bool = False  # whether it has a mass, a centre of gravity and actuators
     banks: bool = False  # whether it turns by banking, within the airframe's bank limit and airspeed envelope
     files: Callable[[Path], Mapping[str, Path]] = _no_files  # the files of an airframe that decide its flights, by name
@@ -70,7 +70,7 @@ def _kinematic(setup: Setup) -> Plant:
 
 
 def _lagged(setup: Setup) -> Plant:
-    from harness.plants.identified import identified  # late: only the identified plants need SciPy
+    from harness.plants.identified import identified  # imported when used: only the identified plants need SciPy
 
     return identified(setup.airframe, setup.airspeed).lagged
 
@@ -83,9 +83,9 @@ def _coordinated(setup: Setup) -> Plant:
 
 def _sixdof(setup: Setup) -> Plant:
     if aircraft.is_recorded(setup.airframe):
-        fitted = f"{setup.airframe.name} is what was fitted to a recorded flight: it flies on lagged and coordinated"
+        fitted = f"{setup.airframe.name} was fitted to a recorded flight: it flies on lagged and coordinated only"
         raise PlantError("plant", fitted)
-    from harness.plants.sixdof import SixDof  # late: only this plant needs JSBSim
+    from harness.plants.sixdof import SixDof  # imported when used: only this plant needs JSBSim
 
     return SixDof(setup.airframe, setup.step, setup.rate_trim, setup.errors)
 
