@@ -39,7 +39,7 @@ def names() -> list[str]:
 def folder(name: str) -> Path:
     """The folder of an airframe, by its name or by a path to a folder with the same files. Else FileNotFoundError.
 
-    Of a recorded flight's aircraft it is the file.
+    For the aircraft of a recorded flight it is the file.
     """
     if name in _shipped():
         return _shipped()[name]
@@ -49,7 +49,7 @@ def folder(name: str) -> Path:
     raise FileNotFoundError(f"no airframe {name!r}: needs airframe.toml and a JSBSim model named as its folder")
 
 
-@cache  # every flight asks
+@cache  # called for every flight
 def _shipped() -> dict[str, Path]:
     """The folders of the airframes that are shipped with the harness, by name."""
     return {name: (FOLDER / name).resolve() for name in names()}
@@ -122,13 +122,13 @@ def _changed(file: Path) -> tuple[int, int] | None:
     return found.st_mtime_ns, found.st_size
 
 
-@lru_cache(maxsize=64)  # each flight of a run asks
+@lru_cache(maxsize=64)  # called for each flight of a run
 def _is_stale(airframe: Path, changed: tuple[tuple[int, int] | None, ...]) -> bool:
     if written(airframe).is_file():
         return bool(_read(written(airframe)).get("data") != _data_hash(airframe))
     if adopted(airframe):
         return False
-    from aircraft.write_models import jsbsim_model  # late: no other airframe needs the template
+    from aircraft.write_models import jsbsim_model  # imported when used: no other airframe needs the template
 
     now = model(airframe).read_text(encoding="utf-8", errors="replace")
     return _nameless(now) != _nameless(jsbsim_model(airframe))
@@ -155,13 +155,13 @@ def data(airframe: Path) -> dict[str, Any]:
 
 
 def adopted(airframe: Path) -> dict[str, Any] | None:
-    """How a model that nobody here wrote was adopted, from its data; None for an airframe of the harness's kind."""
+    """The adoption data of a third-party model; None for one of the harness's own airframes."""
     found = data(airframe).get("adopted")
     return found if isinstance(found, dict) else None
 
 
 def adopted_lag(airframe: Path) -> float | None:
-    """How late an adopted aircraft follows the command of its bank, s; None for one of the harness's kind.
+    """Lag of an adopted aircraft's bank behind its command, s; None for one of the harness's own airframes.
 
     Raises `AirframeError` where its data do not say.
     """
@@ -189,7 +189,7 @@ def limits(airframe: Path) -> Limits:
     return _limits(*files, tuple(map(_changed, files)))
 
 
-@lru_cache(maxsize=64)  # each flight of a run asks
+@lru_cache(maxsize=64)  # called for each flight of a run
 def _limits(data: Path, inner_loop: Path, changed: tuple[tuple[int, int] | None, ...]) -> Limits:
     published, loop = _numbers(data), _numbers(inner_loop)
     return Limits(

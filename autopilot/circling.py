@@ -1,6 +1,6 @@
-"""What a law that steers by course sees of its circle: the motion in the target's frame, and the wind triangle.
+"""The circle as seen by a law that commands a course: the motion in the target's frame, and the wind triangle.
 
-Seen from the target, the aircraft flies around a point at rest, in the wind minus the target's velocity. Vectors have
+In the target's frame the target is at rest and the wind is the wind relative to the target. Vectors have
 two components: along the circle, which is the direction lam = theta - pi/2, and out, away from the target. A bar marks
 an angle against lam; it grows clockwise, so that a positive one leads away from the target. Pure functions of floats.
 """
@@ -63,8 +63,8 @@ def circling(o: Observation, R_d: float, v_a: float, psi_a: float) -> Circling:
 def heading_rate(c: Circling, a: float) -> float:
     """The heading rate that bends the path by `a`, m/s2, clockwise across the course: a / (v_a cos(psi_a - chi_a)).
 
-    With a = |v| u_chi it is Eq. (3), u_chi / L(psi_a), in the target's frame. The air's own acceleration is no work of
-    the aircraft. For what `steered` gives.
+    With a = |v| u_chi it is Eq. (3), u_chi / L(psi_a), in the target's frame. The acceleration of the air is
+    subtracted. Defined for the result of `steered`.
     """
     V, cosine = _course(c)
     a_air = (c.a_out * c.v_along - c.a_along * c.v_out) / V
@@ -72,9 +72,9 @@ def heading_rate(c: Circling, a: float) -> float:
 
 
 def steered(c: Circling) -> Circling:
-    """The same with a course that turns as the heading does: with the air velocity where the wind carries it backwards.
+    """The motion, with the air velocity in place of the course where wind makes course control singular.
 
-    Nothing changes below 0.995 of the airspeed: the angle between course and heading has a cosine above 0.1 there.
+    It is singular where cos(course - heading) <= 0.1, which requires wind above 0.995 of the airspeed.
     """
     if _course(c)[1] > _LEAST_COSINE:
         return c
@@ -103,16 +103,16 @@ def heading_of_course(c: Circling, bar_chi: float, chi_dot: float) -> tuple[floa
 
 
 def course_gain(known: Known) -> float:
-    """The gain K, 1/s, from course error to heading rate that the lag tau of the identified response bears.
+    """The gain K, 1/s, from course error to heading rate for a damping ratio of 0.61 with the identified lag tau.
 
-    Behind a lag the course error e has tau e'' + e' + K e = 0, whose damping ratio is 1 / (2 sqrt(K tau)). PX4 asks for
+    With a lag the course error e has tau e'' + e' + K e = 0, whose damping ratio is 1 / (2 sqrt(K tau)). PX4 requires
     a half, K = 1 / tau, which is its bound 4 pi tau zeta of the period 4 pi zeta / K; its margin makes it 0.61.
     """
     return 1.0 / (MARGIN * max(known.response.lag, known.period))
 
 
 def period_by_lag(damping: float, known: Known) -> float:
-    """The period, s, of the motion around the path with this damping ratio and `course_gain`."""
+    """The period, s, of the path-following dynamics with this damping ratio and `course_gain`."""
     return rounded(4.0 * pi * damping / course_gain(known))
 
 

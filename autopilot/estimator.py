@@ -132,7 +132,7 @@ class Estimator:
 
 def ekf(settings: Estimator) -> "Tracker":
     """The paper's extended Kalman filter before its first measurement."""
-    from filterpy.kalman import ExtendedKalmanFilter  # late: importing it takes half a second
+    from filterpy.kalman import ExtendedKalmanFilter  # imported when used: importing it takes half a second
 
     T_s, q, q_dot = settings.period, settings.process_position_variance, settings.process_velocity_variance
     kalman = ExtendedKalmanFilter(dim_x=4, dim_z=2)

@@ -1,9 +1,9 @@
 """ArduPilot's loiter: the L1 law of Park, Deyst and How towards the centre, and a linear law on the circle.
 
-Formulas as in ArduPilot's `AP_L1_Control`. It knows the velocity over the ground and no wind; the wind is in how a
-lateral acceleration becomes a heading rate, which ArduPilot leaves to the bank angle. It circles points at rest: a
-moving target is one in the target's frame. As in ArduPilot the heading stands for a course that there is not. Left out
-is its memory of the side that it turned to when it flies away from the centre.
+Formulas as in ArduPilot's `AP_L1_Control`. It uses the ground velocity without wind; the wind enters in the conversion
+of lateral acceleration to heading rate, which ArduPilot leaves to the bank angle. It circles points at rest: a moving
+target is at rest in the target's frame. As in ArduPilot the heading replaces the course at zero ground speed. Left out
+is its memory of the turn direction while it flies away from the centre.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ GAIN_SETS = MappingProxyType(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class L1(StandoffLaw):
-    """ArduPilot's L1 loiter: on the circle the range error swings with this period and damping."""
+    """ArduPilot's L1 loiter: on the circle the range error has second-order dynamics with this period and damping."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
     period: Annotated[float, Ge(0.01), About("s: period of the path-following dynamics")]
@@ -38,16 +38,16 @@ class L1(StandoffLaw):
         return circling_step(self, steering(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
-        """What ArduPilot's description of its parameters asks for."""
+        """The recommended range of ArduPilot's parameter description."""
         if 0.6 <= self.damping <= 1.0:
             return []
-        return [f"ArduPilot asks for a damping from 0.6 to 1, and {self.damping:g} is not"]
+        return [f"ArduPilot recommends a damping from 0.6 to 1: {self.damping:g} is outside"]
 
 
 def by_lag(g: L1, known: Known) -> Mapping[str, float]:
     """The period by the rule of `npfg`: near the circle the two laws are the same.
 
-    From afar so short a period asks for more than a limited heading rate gives, and the aircraft overshoots.
+    Far from the circle so short a period saturates the heading rate, and the aircraft overshoots.
     """
     return {"period": period_by_lag(g.damping, known)}
 
@@ -69,7 +69,7 @@ def steering(g: L1) -> Steering:
         e, v_along, v_out = c.r, c.v_along, c.v_out
         bar_chi = wrap(atan2(v_out, v_along))
         a_pd = K_x * e + K_v * v_out  # towards the centre, which is to the left
-        if v_out > 0.0 > v_along and a_pd < 0.0:  # outbound and the wrong way round
+        if v_out > 0.0 > v_along and a_pd < 0.0:  # outbound and in the wrong sense
             a_pd = 0.0
         a_c = v_along * v_along / max(0.5 * R_d, c.L)
         if e > 0.0:

@@ -67,7 +67,7 @@ def law(name: str, gains: str | None = None, **parameters: float | str) -> Law:
 
 
 def made(name: str, kind: LawKind, gains: str | None, **parameters: float | str) -> Law:
-    """The same of any law; one without gain sets has its own defaults."""
+    """The gain sets of any law; a law without gain sets has its own defaults."""
     gains = kind.default if gains is None else gains
     if gains in kind.former_names:
         warnings.warn(renamed(gains, kind.former_names[gains]), FutureWarning, stacklevel=2)
@@ -91,5 +91,5 @@ def _unknown(what: str, name: str, known: Collection[str]) -> str:
 
 
 def renamed(former: str, today: str) -> str:
-    """What a user is told who gives a gain set by its former name."""
-    return f'the gain set "{former}" is now called "{today}"; the former name is still read, for a while'
+    """The deprecation message for a gain set that is given by its former name."""
+    return f'deprecated: the gain set "{former}" was renamed "{today}"; the old name will be removed'

@@ -44,7 +44,7 @@ class Nftsm(StandoffLaw):
         return standoff_step(self, reaching(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
-        """What Definition 5, Eq. (28) and Eq. (30) ask for and these gains break, one sentence each."""
+        """The conditions of Definition 5, Eq. (28) and Eq. (30) that these gains violate, one sentence each."""
         broken = []
         if self.beta2 < 1.0:
             broken.append(
@@ -63,7 +63,7 @@ class Nftsm(StandoffLaw):
 
 
 def behind_inner_loop(g: Nftsm, known: Known) -> Mapping[str, float]:
-    """k2 at half of where the limit cycle begins, a factor of two to spare, and k3 = k2 / 2 as in Table 2."""
+    """k2 with a gain margin of two to the limit cycle, and k3 = k2 / 2 as in Table 2."""
 
     def with_k2(k2: float) -> Nftsm:
         return replace(g, k2=k2, k3=0.5 * k2)
@@ -82,7 +82,7 @@ RULES = MappingProxyType(
     {
         "behind_inner_loop": Rule(
             "fitted",
-            "k2 is half of where the limit cycle begins behind the airframe's inner loop, k3 = k2 / 2",
+            "k2 with a gain margin of 2 to the limit cycle behind the airframe's inner loop, k3 = k2 / 2",
             behind_inner_loop,
         ),
         "scaled": Rule(

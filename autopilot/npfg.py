@@ -1,8 +1,8 @@
 """PX4's nonlinear path following guidance (NPFG) of Stastny and Siegwart, on the circle.
 
 Formulas as in PX4's `DirectionalGuidance` and the papers arXiv:1609.07577 and arXiv:1908.01381, with their feasibility
-of a bearing and their bounds of the period. The wind is as they have it; of moving targets they are silent, and one is
-flown in the target's frame, with the wind against the target and the target's acceleration in the feed-forward.
+of a bearing and their bounds of the period. The wind is treated as there; moving targets are not, and are followed in
+the target's frame, with the wind relative to the target and the target's acceleration in the feed-forward.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ _NO_AIR = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Npfg(StandoffLaw):
-    """PX4's NPFG: the look-ahead angle closes as the track error shrinks; the period is bounded by the roll's lag."""
+    """PX4's NPFG: the look-ahead angle depends on the track error; the period is bounded by the roll time constant."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
     period: Annotated[float, Ge(0.01), About("s: period of the path-following dynamics")]
@@ -71,7 +71,7 @@ RULES = MappingProxyType(
 
 
 def feasibility(v_a: float, cross: float, along: float, w: float) -> float:
-    """Of a bearing, from 0 to 1: `cross` and `along` are the wind's components to it, `w` is the wind speed."""
+    """Feasibility of a bearing, from 0 to 1: `cross` and `along` are the wind components, `w` is the wind speed."""
     cross = w if along < 0.0 else abs(cross)
     share = (v_a - cross) / _BUFFER
     if share >= 1.0:
@@ -89,7 +89,7 @@ def look_ahead(e: float, V: float, time_constant: float) -> float:
 
 
 def bounded_period(g: Npfg, e: float, V: float, v_a: float, w: float, feasible: float) -> float:
-    """The period, s, at an absolute track error: not quicker than the roll's lag allows, nor slower than the turn."""
+    """The period, s, at an absolute track error, bounded below by the roll time constant and above by the turn."""
     period, zeta, tau = g.period, g.damping, g.roll_time
     if tau == 0.0:
         return period

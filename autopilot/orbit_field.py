@@ -30,7 +30,7 @@ GAIN_SETS = MappingProxyType(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitField(StandoffLaw):
-    """Orbit following of Beard and McLain: k_orbit leans the course towards the orbit, k turns the aircraft to it."""
+    """Orbit following of Beard and McLain: k_orbit is the orbit gain of the course field, k the course feedback."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
     k_orbit: Annotated[float, Gt(0), About("orbit gain: atan(k_orbit r / R_d) is the course offset towards the orbit")]
@@ -47,9 +47,9 @@ class OrbitField(StandoffLaw):
 
 
 def by_lag(g: OrbitField, known: Known) -> Mapping[str, float]:
-    """On the circle the course error is fed back by k + V k_orbit / R_d, the lean's rate included: the lag bears it.
+    """The sum k + V k_orbit / R_d, which feeds the course error back on the circle, is `course_gain`.
 
-    Both halves equal, range and course error decay as fast as each other.
+    With equal halves range error and course error decay at the same rate.
     """
     half = 0.5 * course_gain(known)
     return {"k": rounded(half), "k_orbit": rounded(half * g.standoff / known.airspeed)}

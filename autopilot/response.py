@@ -1,4 +1,4 @@
-"""A linear response of static gain one to a delayed command, and its exact motion while the command is held."""
+"""A linear response with static gain one to a delayed command, and its exact solution under a zero-order hold."""
 
 import math
 from collections import deque
@@ -27,8 +27,8 @@ class Response:
 
         exp(-delay s) (1 + lead s) / q(s; bank) q(s; zero) / q(s; sideslip) (1 + (1 - share) s / rate) / (1 + s / rate)
 
-    with q(s; w, z) = 1 + 2 z s / w + (s / w)^2. The static gain is one. The tail is the slow end of the response that
-    the rate trim, an integrator, leaves; `share` and `rate` are `tail_share` and `tail_rate`.
+    with q(s; w, z) = 1 + 2 z s / w + (s / w)^2. The static gain is one. The tail is the slow mode of the rate trim, an
+    integrator; `share` and `rate` are `tail_share` and `tail_rate`.
     """
 
     delay: Annotated[Seconds, Ge(0), Lt(10), About("transport delay")]
@@ -78,7 +78,7 @@ class Response:
         return np.asarray(np.exp(-s * self.delay) * numerator / denominator)
 
     def quicker(self, times: float) -> Self:
-        """The same response with a time scale shorter by the factor `times`."""
+        """The response with its bandwidth scaled by the factor `times`: all time constants are divided by it."""
         return replace(
             self,
             delay=self.delay / times,
@@ -91,7 +91,7 @@ class Response:
 
     @property
     def lag(self) -> float:
-        """How late the response is to a slow command, s: minus the derivative of the transfer function at zero."""
+        """Low-frequency delay, s: minus the derivative of the transfer function at zero frequency."""
         return (
             self.delay
             + 2.0 * self.damping / self.frequency
@@ -121,10 +121,10 @@ class Response:
 
 @lru_cache(maxsize=64)
 def held(response: Response, period: float) -> tuple[int, Array, Array, Array]:
-    """A response, its integral and that one's, under commands held for `period`, s.
+    """The discrete system of a response and its first and second integral under a zero-order hold of `period`, s.
 
-    The whole periods in its delay; how a period moves the states; what the command of this period and the one before
-    add to them. The states are those of `matrices`, then the two integrals.
+    Returns the whole periods in the delay, the transition matrix of a period, and the input vectors of this period's
+    command and of the one before. The states are those of `matrices`, then the two integrals.
     """
     A, b, c = response.matrices()
     n = len(b)
@@ -138,7 +138,7 @@ def held(response: Response, period: float) -> tuple[int, Array, Array, Array]:
 
 
 def critical_gain(response: Response, period: float) -> tuple[float, float]:
-    """Smallest gain, 1/s, from heading error to command that makes the sampled loop oscillate, its rad/s; or inf."""
+    """Critical gain, 1/s, from heading error to command, and frequency, rad/s, of the sampled loop; inf if none."""
     omega = math.pi / period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
     H = response.sampled(period, np.exp(1j * omega * period))[:, 0]
     crossing = np.flatnonzero((np.sign(H.imag[1:]) != np.sign(H.imag[:-1])) & (H.real[1:] < 0.0))
@@ -149,7 +149,7 @@ def critical_gain(response: Response, period: float) -> tuple[float, float]:
 
 
 def _expm(matrix: Array) -> Array:
-    from scipy.linalg import expm  # late: it takes a tenth of a second
+    from scipy.linalg import expm  # imported when used: the import takes a tenth of a second
 
     return np.asarray(expm(matrix))
 
@@ -197,14 +197,14 @@ class Held(NamedTuple):
 
 
 class Delay:
-    """The commands on their way to a plant that gets each of them `delay` ns late. Counts time in nanoseconds."""
+    """Transport delay: a queue of commands that take effect `delay` ns later. Time is in nanoseconds."""
 
     def __init__(self, delay: int) -> None:
         self._delay, self._input = delay, 0.0
         self._coming: deque[tuple[int, float]] = deque()  # (time until it acts, command)
 
     def pieces(self, command: float, period: float) -> Iterator[Held]:
-        """Moves on by `period` seconds with `command` given now, in pieces within which what acts is constant."""
+        """Advances by `period` seconds with `command` given now, in pieces of constant effective command."""
         self._coming.append((self._delay, command))
         left = round(period * 1e9)
         while left:
@@ -217,7 +217,7 @@ class Delay:
 
 
 class Propagator:
-    """A response while its input is held: exact over any interval. Its `delay`, ns, is not in it."""
+    """Exact solution of a response under constant input over any interval, without its `delay`, ns."""
 
     def __init__(self, response: Response, nodes: int) -> None:
         A, b, c = response.matrices()
@@ -253,6 +253,6 @@ def _row(values: Array) -> tuple[float, ...]:
 
 
 def dot(row: Sequence[float], values: Sequence[float]) -> float:
-    """The scalar product, summed in the order of the terms: the same bits on every machine."""
+    """The scalar product, summed in the order of the terms: bit-identical on every machine."""
     total: float = sum(map(mul, row, values))
     return total

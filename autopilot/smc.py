@@ -32,7 +32,7 @@ class Smc(StandoffLaw):
         return standoff_step(self, reaching(self))
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
-        """The paper asks for positive gains only, which the fields hold."""
+        """None: the paper requires positive gains only, which the fields' bounds ensure."""
         return []
 
 

@@ -1,10 +1,10 @@
-"""Whether a loop has fallen into a limit cycle, told from what was commanded and what was flown alone.
+"""Detection of a limit cycle from the commanded and the flown heading rate.
 
-The test: a command that swings by less than `VISIBLE` is in none. One that swings by more is in a limit cycle when the
-flown heading rate keeps its phase for `REMEMBERED` cycles. Gusts and noise also set a loop swinging at the frequency it
-is inclined to, but such a swing forgets its phase within a cycle or two: after five its correlation with itself is near
-zero, a limit cycle's in still air is near one. Where the phase is not kept, gusts or noise may hide a cycle: the record
-cannot tell. Error rates of the test, measured on flights: `docs/answers/chatter.md`.
+A command that oscillates by less than `VISIBLE` is not in a limit cycle. One that oscillates by more is in a limit
+cycle if the flown heading rate keeps its phase for `REMEMBERED` cycles. Gusts and noise also excite a lightly damped
+loop at its resonance, but a noise-driven oscillation loses phase coherence within a few cycles: its autocorrelation
+after five is near zero, that of a limit cycle in still air near one. Without phase coherence gusts or noise may mask a
+cycle: the record does not decide. Error rates of the test, measured on flights: `docs/answers/chatter.md`.
 """
 
 import math
@@ -15,32 +15,32 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-VISIBLE = math.radians(0.5)  # rad/s, half of peak to peak: a command that swings by less is not called a limit cycle
-REMEMBERED = 5  # cycles
-LEAST_CORRELATION = 0.6  # with itself, so many cycles later
-SLOWEST = 0.2  # Hz: what is slower may be the wind's, round a lap, or the way to the circle
-FEWEST_CYCLES = 12  # in a record: a slower oscillation is not looked for
-SHORTEST = 30.0  # s: a shorter record tells nothing
-_FINER = 8  # times: the spectrum's grid
-_FEWEST_ROWS = 32  # of a record that has a spectrum
-_BINS = 30  # of a spectrum, per decade
-_FEWEST_CROSSINGS = 4  # of the mean
+VISIBLE = math.radians(0.5)  # rad/s: least amplitude (half of peak to peak) of the command in a limit cycle
+REMEMBERED = 5  # cycles of lag at which the autocorrelation is evaluated
+LEAST_CORRELATION = 0.6  # least autocorrelation of a limit cycle at that lag
+SLOWEST = 0.2  # Hz: lowest frequency of a limit cycle; below it wind around a lap and the approach dominate
+FEWEST_CYCLES = 12  # least number of cycles in a record; slower oscillations are not searched
+SHORTEST = 30.0  # s: shortest record that is judged
+_FINER = 8  # zero-padding factor of the spectrum
+_FEWEST_ROWS = 32  # shortest record that has a spectrum
+_BINS = 30  # bins of a spectrum per decade
+_FEWEST_CROSSINGS = 4  # least number of crossings of the mean
 
 
 class Oscillation(NamedTuple):
     """The strongest oscillation in a record of heading rate. SI, rad; amplitudes are half of peak to peak."""
 
-    chatters: bool | None  # whether it is a limit cycle; None when gusts or noise may hide one
+    chatters: bool | None  # whether it is a limit cycle; None if gusts or noise may mask one
     frequency: float  # Hz
     heading_rate: float  # amplitude of the flown heading rate, rad/s
     command: float  # amplitude of its command, rad/s
-    correlation: float  # of the flown heading rate with itself `REMEMBERED` cycles later
+    correlation: float  # autocorrelation of the flown heading rate at a lag of `REMEMBERED` cycles
 
 
 def oscillation(command: Array, flown: Array, period: float) -> Oscillation | None:
     """The strongest oscillation of a settled record: commanded and flown heading rate, rad/s, a value per `period` s.
 
-    None where the record cannot tell: shorter than `SHORTEST`, not finite, or sampled too slowly for `SLOWEST`.
+    None if the record does not decide: shorter than `SHORTEST`, not finite, or sampled too slowly for `SLOWEST`.
     """
     slowest = _slowest(command, flown, period)
     if slowest is None:
@@ -56,17 +56,17 @@ def oscillation(command: Array, flown: Array, period: float) -> Oscillation | No
 
 
 def rests(command: Array, flown: Array, period: float) -> bool:
-    """Whether `oscillation` finds no limit cycle for this alone, that the command nowhere swings by `VISIBLE`."""
+    """Whether `oscillation` finds no limit cycle because the command never oscillates by `VISIBLE`."""
     slowest, still = _slowest(command, flown, period), 2.0 * VISIBLE * (1.0 - 1e-9)  # less is rounding
     if slowest is None:
         return False
-    if 2.0 * np.ptp(command) < still:  # what is left beside an average reaches no farther
+    if 2.0 * np.ptp(command) < still:  # bounds the range after subtraction of an average
         return True
     return bool(np.ptp(_without_slow(command, 1.0 / (slowest * period))) < still)
 
 
 def _slowest(command: Array, flown: Array, period: float) -> float | None:
-    """The lowest frequency that is looked for, Hz; None where the record cannot tell."""
+    """The lowest frequency that is searched, Hz; None if the record does not decide."""
     lasted = len(flown) * period
     if lasted < SHORTEST or not (np.isfinite(command).all() and np.isfinite(flown).all()):
         return None
@@ -75,9 +75,9 @@ def _slowest(command: Array, flown: Array, period: float) -> float | None:
 
 
 def spectrum(command: Array, period: float) -> tuple[Array, Array]:
-    """Frequency, Hz, and amplitude of a record, in its unit; empty of a short one.
+    """Frequency, Hz, and amplitude of a record, in its unit; empty for a short one.
 
-    A sinusoid has its own amplitude at its frequency (Hann's window); of each thirtieth of a decade the highest.
+    A sinusoid has its own amplitude at its frequency (Hann window); each bin, a thirtieth of a decade, has its maximum.
     """
     if len(command) < _FEWEST_ROWS:
         return np.empty(0), np.empty(0)
@@ -89,7 +89,7 @@ def spectrum(command: Array, period: float) -> tuple[Array, Array]:
 
 
 def swinging(command: Array, period: float) -> NDArray[np.bool_]:
-    """Row by row, whether the command, rad/s, swings by `VISIBLE`: twice up and down in the 5 s around it, or more."""
+    """For each row, whether the command, rad/s, oscillates by `VISIBLE`, at least two cycles in the 5 s around it."""
     around = max(2, min(round(1.0 / (SLOWEST * period)), len(command)))
     padded = np.pad(command, (around // 2, around - 1 - around // 2), mode="edge")
     parts = np.lib.stride_tricks.sliding_window_view(padded, around)
@@ -99,7 +99,7 @@ def swinging(command: Array, period: float) -> NDArray[np.bool_]:
 
 
 def _without_slow(x: Array, samples: float) -> Array:
-    """What is left beside the average over so many samples, taken twice, which leaves a cycle within it as it was."""
+    """The record minus its moving average, taken twice, over so many samples; faster cycles are unchanged."""
     half = round(0.5 * samples)
     window = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     average = np.convolve(np.convolve(x, window, "valid"), window, "valid")
@@ -122,7 +122,7 @@ def _amplitude(x: Array, cycle: float) -> float:
 
 
 def _correlation(x: Array, lag: int) -> float:
-    """Of a record with itself so many samples later."""
+    """Autocorrelation of a record at a lag of so many samples."""
     before, after = x[: len(x) - lag], x[lag:]
     size = math.sqrt(float(before @ before) * float(after @ after))
     return float(before @ after) / size if size > 0.0 else 0.0

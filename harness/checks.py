@@ -77,7 +77,7 @@ def _cannot_start(plant: Plant, start: Start, wind: tuple[float, float]) -> tupl
 def _cannot_start_apart(
     plant: Plant, start: Start, wind: tuple[float, float], model: Path, changed: float
 ) -> tuple[str, str] | None:
-    from harness.plants.model import ModelError, parsed  # late: only this plant needs JSBSim
+    from harness.plants.model import ModelError, parsed  # imported when used: only this plant needs JSBSim
 
     try:
         parsed(model)

@@ -106,7 +106,7 @@ def told_response(flight: Flight) -> "Response":
 
     Raises `IdentifiedError` where it is not known, FileNotFoundError for an unknown airframe.
     """
-    from harness.plants.identified import identified  # late: most laws need none
+    from harness.plants.identified import identified  # imported when used: most laws need none
 
     response = identified(aircraft.folder(flight.aircraft), flight.start.airspeed).heading_rate
     speed = flight.errors.response_speed

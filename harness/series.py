@@ -1,4 +1,4 @@
-"""What a time series is summarised by: size, settling, overshoot. Arrays of one dimension."""
+"""Summaries of a time series: rms, peak, settling time, overshoot. Arrays of one dimension."""
 
 import math
 
@@ -9,19 +9,19 @@ Array = NDArray[np.float64]
 
 
 def rms(x: Array) -> float:
-    """The root of the mean square; NaN of nothing."""
+    """The root mean square; NaN for an empty array."""
     return math.sqrt(np.mean(x * x)) if len(x) else math.nan
 
 
 def peak(x: Array) -> float:
-    """The largest size; NaN of nothing, or where one value is."""
+    """The largest absolute value; NaN for an empty array, or if one value is NaN."""
     return float(np.abs(x).max()) if len(x) else math.nan
 
 
 def settling_time(time: Array, error: Array, tolerance: float, least: float) -> float | None:
-    """The first time after which |error| stays below `tolerance`; None when less than `least` seconds are left then.
+    """The first time after which |error| stays below `tolerance`; None if less than `least` seconds remain then.
 
-    `time` in s, increasing; `error` and `tolerance` in one unit. An error that is not finite is outside.
+    `time` in s, increasing; `error` and `tolerance` in the same unit. A non-finite error is outside.
     """
     outside = np.flatnonzero(~(np.abs(error) < tolerance))
     first = outside[-1] + 1 if outside.size else 0
@@ -37,7 +37,7 @@ def overshoot(error: Array) -> float:
 
 
 def unwrapped(angle: Array) -> Array:
-    """Angles, rad, counted on beyond a whole turn: the bits of `np.unwrap`, without its work where nothing jumps."""
+    """Unwrapped angles, rad: bit-identical to `np.unwrap`, without its work where nothing jumps."""
     step = np.diff(angle)
     jumps = np.flatnonzero(~(np.abs(step) < math.pi))
     if not jumps.size:
@@ -51,5 +51,5 @@ def unwrapped(angle: Array) -> Array:
 
 
 def azimuth(north: Array, east: Array) -> Array:
-    """The direction of a position, rad, clockwise from north, counted on beyond a whole turn."""
+    """The direction of a position, rad, clockwise from north, unwrapped."""
     return unwrapped(np.arctan2(east, north))

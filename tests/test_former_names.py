@@ -34,7 +34,7 @@ duration_s = 2.0
 
 
 def test_a_former_name_makes_the_same_law_and_warns() -> None:
-    with pytest.warns(FutureWarning, match='"identified" is now called "fitted"'):
+    with pytest.warns(FutureWarning, match='"identified" was renamed "fitted"'):
         former = law("nftsm", "identified")
     assert former == law("nftsm", "fitted")
 
@@ -48,7 +48,9 @@ def test_a_law_that_names_no_gain_set_has_its_declared_default_and_that_converge
 
 def test_a_file_with_the_former_name_is_read_and_told_its_line(tmp_path: Path) -> None:
     path = write(tmp_path / "a.toml", FILE)
-    with pytest.warns(FutureWarning, match=f'^{re.escape(str(path))}:6: flight.law.gains: the gain set "identified"'):
+    with pytest.warns(
+        FutureWarning, match=f'^{re.escape(str(path))}:6: flight.law.gains: deprecated: the gain set "identified"'
+    ):
         flight = load_flight(path)
     assert flight.law == law("nftsm")
     with pytest.warns(FutureWarning, match=r"^--set law.gains=identified: flight.law.gains: "):
@@ -84,6 +86,6 @@ def test_the_command_line_warns_in_one_line(tmp_path: Path) -> None:
     assert done.returncode == 0
     warnings = [line for line in done.stderr.splitlines() if line.startswith("warning")]
     assert warnings == [
-        f'warning: {path}:6: flight.law.gains: the gain set "identified" is now called "fitted"; '
-        "the former name is still read, for a while"
+        f'warning: {path}:6: flight.law.gains: deprecated: the gain set "identified" was renamed "fitted"; '
+        "the old name will be removed"
     ]

@@ -140,5 +140,5 @@ def test_compare_says_which_laws_predict_on_one_plant_and_not_on_another(tmp_pat
         '[matrix]\nplant = ["kinematic", "lagged"]\n"law.name" = ["nftsm_lead", "lq_orbit", "smc"]\n',
     )
     harness.run(experiment, tmp_path / "out", workers=0)
-    told = "Predict the answer of the inner loop, but not on kinematic, which answers at once: nftsm_lead, lq_orbit."
+    told = "Use a model of the inner loop, bypassed on kinematic (ideal inner loop): nftsm_lead, lq_orbit."
     assert told in harness.compare(tmp_path / "out").answer.splitlines()

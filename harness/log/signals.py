@@ -1,4 +1,4 @@
-"""What several metrics make of a flight's log: where circling is judged, and how the command is followed."""
+"""Signals that several metrics share: the window in which circling is judged, and the response to the command."""
 
 import math
 from dataclasses import dataclass
@@ -16,13 +16,15 @@ from harness.series import azimuth, settling_time, unwrapped
 
 Array = NDArray[np.float64]
 
-SETTLED_FOR = 5.0  # s: at least so much of the flight is left after convergence
-LEAST_PACE = 0.1  # of v_a / R_d, that in still air: up to w = 0.9 v_a no part of a circle is flown at less
+SETTLED_FOR = 5.0  # s: shortest remaining flight after convergence
+LEAST_PACE = (
+    0.1  # least mean angular rate over v_a / R_d, its value in still air: exceeded everywhere up to w = 0.9 v_a
+)
 AVERAGED_OVER = 0.25  # s
 LONGEST_LAG = 2.0  # s
-LEAST_EXCITATION = np.radians(0.5)  # rad/s: a command, or a turn, that varies less tells nothing of lag or ratio
-AS_WELL = 0.9  # share of what the best delay explains: a smaller delay that explains so much is taken
-LEAST_EXPLAINED = 0.5  # share of the flown rate's variation: a command that explains less tells nothing of the lag
+LEAST_EXCITATION = np.radians(0.5)  # rad/s: least standard deviation of a command, or turn, for a lag or ratio
+AS_WELL = 0.9  # a smaller delay is preferred if it explains this share of what the best delay explains
+LEAST_EXPLAINED = 0.5  # least share of the flown rate's variance explained by the command for a lag
 
 
 class Window(NamedTuple):
@@ -34,7 +36,7 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class Signals:
-    """A flight's log, and what several metrics make of it, worked out once. SI, rad. The log has at least one row."""
+    """A flight's log and the signals derived from it, computed once. SI, rad. The log has at least one row."""
 
     log: FlightLog
 
@@ -59,10 +61,10 @@ class Signals:
         return _lag_and_gain(self.held_command, self.flown_rate, self.period)
 
     def settling_time(self, tolerances: float = 1.0) -> float | None:
-        """When |range error| is below so many times the flight's tolerance for good, s; see `SETTLED_FOR`.
+        """Time from which |range error| stays below `tolerances` times the flight's tolerance, s; see `SETTLED_FOR`.
 
-        None of a flight that ended early: what it would have done next is not known. None too of one that does not go
-        round its target from then on: on its circle, but held up by the wind.
+        None for a flight that ended early, since its continuation is unknown, and for one that does not move around its
+        target from then on: on its circle, but held in place by the wind.
         """
         if self.log.outcome is not Outcome.COMPLETED:
             return None
@@ -72,12 +74,12 @@ class Signals:
 
     @cached_property
     def around(self) -> Array:
-        """Direction from the target to the aircraft, rad, counted on beyond a whole turn."""
+        """Direction from the target to the aircraft, rad, unwrapped."""
         log = self.log
         return azimuth(log["north"] - log["target_north"], log["east"] - log["target_east"])
 
     def goes_round(self, first: int) -> bool:
-        """Whether the aircraft goes round its target from this row on, at `LEAST_PACE` at least."""
+        """Whether the aircraft moves around its target from this row on, on average at `LEAST_PACE` or more."""
         flight, time = self.log.flight, self.log["time"]
         in_still_air = flight.start.airspeed / flight.law.standoff * (time[-1] - time[first])
         return bool(abs(self.around[-1] - self.around[first]) >= LEAST_PACE * in_still_air)
@@ -88,10 +90,10 @@ class Signals:
 
     @cached_property
     def window(self) -> Window:
-        """After convergence the last whole laps round the target, or all that is left when that is less than a lap.
+        """The last whole laps around the target after convergence, or all that remains if that is less than a lap.
 
-        Of a flight that does not converge: its last half. So too of a circle that the heading-rate limit cannot hold,
-        which every lap leaves again: that the flight happens to end near it does not make it settled.
+        For a flight that does not converge it is the last half. So it is for a circle that the heading-rate limit
+        cannot hold, which the aircraft leaves in every lap: an end near the circle does not make the flight settled.
         """
         log, converged = self.log, self.settling_time()
         if converged is None or feasibility_margin(log.flight) < 0.0:
@@ -108,13 +110,13 @@ class Signals:
 
     @cached_property
     def oscillation(self) -> Oscillation | None:
-        """The strongest oscillation while circling is judged; None when the record is too short to tell."""
+        """The strongest oscillation in the judged window; None if the record is too short."""
         first = self.window.first
         return oscillation(self.held_command[first:], self.flown_rate[first:], self.period)
 
     @cached_property
     def chatters(self) -> bool | None:
-        """Whether there is a limit cycle while circling is judged; None when the record cannot tell."""
+        """Whether there is a limit cycle in the judged window; None if the record does not decide."""
         first = self.window.first
         if rests(self.held_command[first:], self.flown_rate[first:], self.period):
             return False
@@ -122,14 +124,14 @@ class Signals:
 
     @property
     def limit_cycle(self) -> Oscillation | None:
-        """The limit cycle while circling is judged; None when there is none, or none to be told."""
+        """The limit cycle in the judged window; None if there is none or the record does not decide."""
         return self.oscillation if self.chatters else None
 
 
 def at_limit(log: FlightLog) -> NDArray[np.bool_]:
-    """In which rows the command is at the limit of its law; a command that is filtered may be less than it wants.
+    """The rows in which the command saturates at the limit of its law; a filtered command may be below its demand.
 
-    A limit in course rate is another heading rate in each direction: there the law says itself that it wants more.
+    A limit in course rate is a different heading rate in each direction: there the law reports its unlimited command.
     """
     command, law = np.abs(log["heading_rate_command"]), log.flight.law
     if law.command == "course_rate":
@@ -138,14 +140,14 @@ def at_limit(log: FlightLog) -> NDArray[np.bool_]:
 
 
 def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | None, float | None]:
-    """The delay at which the command explains most of the flown rate's variation, and the ratio there.
+    """The delay at which the command explains most of the flown rate's variance, and the ratio there.
 
-    Both by least squares, and exact for a pure delay: over a period, a held command delayed by a share of a period is
-    a mix of two neighbours. Behind a periodic command, as of a limit cycle, delays of a period more explain as well:
-    the smallest is taken, since a loop that swings by itself lags by less than its period.
+    Both by least squares, and exact for a pure delay: over a period, a held command delayed by a fraction of a period
+    is a mix of two neighbours. With a periodic command, as in a limit cycle, delays longer by a period fit as well: the
+    smallest is taken, since a self-sustained oscillation lags by less than its period.
 
-    A slow command tells the ratio, not the delay: it has to change by `LEAST_EXCITATION` within `AVERAGED_OVER`; nor
-    does one tell it that gusts outweigh.
+    The delay is reported only if the command excites it (standard deviation of its change over `AVERAGED_OVER` of at
+    least `LEAST_EXCITATION`) and explains at least `LEAST_EXPLAINED` of the output variance.
     """
     longest = min(round(LONGEST_LAG / period), len(command) // 2)
     if longest < 1 or np.std(command) < LEAST_EXCITATION:
@@ -164,11 +166,10 @@ def _lag_and_gain(command: Array, flown: Array, period: float) -> tuple[float | 
 
 
 def _mixes(command: Array, y: Array, longest: int) -> tuple[Array, Array]:
-    """What of y the command, late by n samples, explains when mixed best with the next delay; the share of the next.
+    """The sum of squares of y explained by the best mix of the command delayed by n and n + 1 samples; the mix.
 
-    n is below `longest`.
-
-    Sums of squares about the means; neither is taken negatively.
+    The mix is the share of the delay n + 1, for n below `longest`. Sums of squares about the means; negative weights
+    are excluded.
     """
     c, size = command - command.mean(), len(y)  # so that the running sums lose no digits
     y = y - y.mean()

@@ -28,7 +28,7 @@ _TRANSIENT = 4.0  # s, at the beginning: what was commanded before the log is no
 _LOWEST = (-0.5, math.log(1.0), math.log(0.3), 0.2, -0.5)
 _HIGHEST = (3.0, math.log(40.0), math.log(4.0), 3.0, 0.5)
 _STARTS = ((0.05, 8.0, 1.0), (0.5, 5.0, 0.8), (1.2, 4.0, 1.0))  # the smallest delay first
-_USUAL = (0.1, math.log(7.0), math.log(1.0))  # delay, log of frequency and damping: what the data do not tell
+_USUAL = (0.1, math.log(7.0), math.log(1.0))  # prior means: delay, s, log of frequency, rad/s, log of damping
 _SPREAD = (0.2, 0.7, 0.4)
 _FIRM = 3.0  # times the noise: residuals of a simple model are alike for a while, and so count for less
 AS_WELL = 0.9  # of what the best delay explains: behind a periodic command one a period more explains as well
@@ -37,7 +37,7 @@ DELAY, FREQUENCY, DAMPING, GAIN, LAG = range(5)
 
 @dataclass(frozen=True, slots=True)
 class ResponseFit:
-    """The fitted numbers and what each block of the flight says of them. SI, rad."""
+    """The fitted parameters and their jackknife pseudo-values over the blocks of the flight. SI, rad."""
 
     delay: float
     frequency: float
@@ -51,12 +51,12 @@ class ResponseFit:
 
     @property
     def lag(self) -> float:
-        """How late the response is behind a slow command, s."""
+        """Low-frequency delay, s."""
         return self.delay + 2.0 * self.damping / self.frequency
 
     @property
     def response(self) -> Response:
-        """As a plant flies it: of gain one, and not before its command."""
+        """The response as a plant uses it: with static gain one and a delay of at least zero."""
         return plain(max(0.0, self.delay), self.frequency, self.damping)
 
     def lag_interval(self) -> tuple[float, float]:

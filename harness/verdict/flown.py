@@ -14,7 +14,7 @@ from harness.verdict.pairs import joined, ordered, shown, spread
 
 TOLD = ("convergence_time_s", "range_error_rms_m", "saturation_fraction", "sideslip_rms_deg")  # beside the counts
 MOST_LINES = 24
-MOST_VALUES = 4  # told one by one
+MOST_VALUES = 4  # listed one by one
 
 
 class Shares(NamedTuple):
@@ -57,13 +57,13 @@ def gains_by_rule(flights: pd.DataFrame) -> Iterator[str]:
 
 
 def predicting(flights: pd.DataFrame) -> Iterator[str]:
-    """Which laws do otherwise on one plant than on another: those that predict, where there is nothing to predict."""
+    """The laws with a model of the inner loop, which is bypassed on the plants with an ideal inner loop."""
     at_once = [plant for plant in flights["plant"].unique() if plant in PLANTS and PLANTS[plant].at_once]
     kinds = {str(name): loaded_kind(str(name)) for name in flights["law.name"].unique()}
     laws = [name for name, kind in kinds.items() if kind and getattr(kind.value, "uses_response", False)]
     if laws and at_once and len(at_once) < flights["plant"].nunique():
         plants = " and ".join(at_once)
-        yield f"Predict the answer of the inner loop, but not on {plants}, which answers at once: {', '.join(laws)}."
+        yield f"Use a model of the inner loop, bypassed on {plants} (ideal inner loop): {', '.join(laws)}."
 
 
 def _given_by_rule(row: pd.Series, decided: list[str]) -> str:
@@ -119,7 +119,7 @@ def lines(comparison: Comparison) -> Iterator[str]:
 
 
 def quiet(comparison: Comparison) -> Iterator[str]:
-    """In how many flights of each value of what is compared no limit cycle shows."""
+    """The number of flights without a limit cycle, for each value that is compared."""
     flights = comparison.table
     values = ordered(flights[comparison.by])
     if len(values) > MOST_VALUES:
@@ -131,4 +131,4 @@ def quiet(comparison: Comparison) -> Iterator[str]:
         ]
     told = [f"{of.of - of.number} of {of.of}{which}" for which, of in cycling if of.of]
     if told:
-        yield f"No limit cycle, of the flights in which it can be told, in {', '.join(told)}."
+        yield f"No limit cycle, among the flights in which this can be decided, in {', '.join(told)}."

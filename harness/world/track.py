@@ -77,7 +77,7 @@ def load_track(path: Path) -> Track:
 @lru_cache(maxsize=16)
 def _parsed(path: Path, content: bytes) -> Track:
     """The track that the content of a file describes; `path` is for messages."""
-    from scipy.interpolate import CubicSpline  # late: it takes a tenth of a second to import
+    from scipy.interpolate import CubicSpline  # imported when used: it takes a tenth of a second to import
 
     times, norths, easts = zip(*_rows(path, content.decode("utf-8-sig")), strict=True)
     north, east = (CubicSpline(times, values).c.T.tolist() for values in (norths, easts))

@@ -74,7 +74,7 @@ def _made(wind: Wind, airspeed: float, altitude: float, step: float, steps: int,
     gusts = wind.gust(step * np.arange(steps + 1, dtype=np.float64))
     rotation = None
     if wind.turbulence != "none":
-        from harness.world.turbulence import dryden, turbulence  # late: only turbulence needs SciPy
+        from harness.world.turbulence import dryden, turbulence  # imported when used: only turbulence needs SciPy
 
         W_x, W_y = wind.steady
         model = dryden(wind.turbulence, airspeed, altitude)
