@@ -1,6 +1,6 @@
 """The airframes: one folder each, with a JSBSim model and the data from which it was written.
 
-The aircraft of a recorded flight is a file: what was fitted to its log, and nothing to fly with six degrees of freedom.
+The aircraft of a recorded flight is a file with the response fitted to its log, without a 6-DOF model.
 """
 
 import hashlib
@@ -82,20 +82,18 @@ def identified(airframe: Path) -> Path:
 
 
 def argument(airframe: Path) -> str:
-    """What a user types for the airframe: the name of one that is shipped, otherwise its folder."""
+    """The airframe as typed by a user: the name of a shipped one, otherwise its folder."""
     return airframe.name if airframe.parent == FOLDER else str(airframe)
 
 
 def written(airframe: Path) -> Path:
-    """The path of the file that says from which data the model was written."""
+    """The path of the file that records the data from which the model was written."""
     return airframe / "written.toml"
 
 
 def keep_written(airframe: Path) -> None:
-    """Notes that the model belongs to the data as they are now. Raises `AirframeError` and OSError."""
-    about = (
-        "# Written with the model: a hash of airframe.toml and inner_loop.toml, that a change of them is not missed.\n"
-    )
+    """Records that the model matches the present data. Raises `AirframeError` and OSError."""
+    about = "# Written with the model: a hash of airframe.toml and inner_loop.toml, so that changes are detected.\n"
     partial = written(airframe).with_suffix(".partial")
     partial.write_text(f'{about}data = "{_data_hash(airframe)}"\n', encoding="utf-8")
     partial.replace(written(airframe))
@@ -220,7 +218,7 @@ def _recorded_limit(file: Path, name: str) -> float:
     table = _read(file).get("limits")
     value = table.get(name) if isinstance(table, dict) else None
     if isinstance(value, bool) or not isinstance(value, float | int) or not math.isfinite(value):
-        raise AirframeError(f"{file}: limits.{name} must be a number: the file is none of harness assess --fit")
+        raise AirframeError(f"{file}: limits.{name} must be a number: not a file written by harness assess --fit")
     return float(value)
 
 

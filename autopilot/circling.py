@@ -35,11 +35,11 @@ class Circling(NamedTuple):
 
 
 Steering = Callable[[Circling], tuple[float, float, float, float]]
-"""From what is seen to (course or heading error, s, feed-forward, rest of the command) in rad, rad, rad/s, rad/s."""
+"""A function from the motion to (course or heading error, s, feed-forward, rest of the command); rad and rad/s."""
 
 
 def circling(o: Observation, R_d: float, v_a: float, psi_a: float) -> Circling:
-    """What is seen with airspeed `v_a` and heading `psi_a`: the velocity over ground is theirs with the wind."""
+    """The motion with airspeed `v_a` and heading `psi_a`: the ground velocity is theirs plus the wind."""
     x_r, y_r = o.north - o.target_north, o.east - o.target_east
     v_t_x, v_t_y = o.target_velocity_north, o.target_velocity_east
     a_t, omega_t = o.target_acceleration, o.target_turn_rate

@@ -18,7 +18,7 @@ class RuleError(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Known:
-    """What a rule knows of a flight besides its law. SI, rad.
+    """The flight as seen by a gain rule, besides its law. SI, rad.
 
     `border(law_at, guess)` is the gain q > 0, near the guess, at which the limit cycle of the law `law_at(q)` begins on
     its circle behind the identified response. Raises `RuleError` where there is none.

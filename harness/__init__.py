@@ -4,8 +4,8 @@ A flight is a frozen value: make one with `Flight` and `law`, or read one with `
 `dataclasses.replace`. `simulate(flight)` flies it and gives a `FlightLog`, which has `.frame()`, `.metrics` and
 `.plot()`; `record` writes it for the Rerun viewer, `read_flight` reads it back.
 
-`run(path, out=...)` flies a matrix of flights, `load_results(dir)` reads its table, `compare(dir)` says how the flights
-differ that are alike but for the plant.
+`run(path, out=...)` flies a matrix of flights, `load_results(dir)` reads its table, `compare(dir)` compares the flights
+that differ only in the plant.
 
 Inside, everything is SI and radians; the world is north-east-down from the flight's origin, headings are clockwise from
 north, a wind is the velocity of the air (towards). Paths are `str` or `Path`. The harness's errors have the
@@ -87,7 +87,7 @@ __all__ = [
     "simulate",
 ]
 
-# Where each name lives. It is loaded when it is first asked for: `harness --help` needs none of them.
+# The module of each name, which is imported at its first use: `harness --help` needs none of them.
 _HOMES = {
     "autopilot.estimator": ["Estimator"],
     "autopilot.guidance": ["Context", "Guidance", "Law", "Observation"],

@@ -35,9 +35,9 @@ _OF_PLANT = ("plant", "aircraft", "step", "start.airspeed", "inner_loop.rate_tri
 
 
 def start_problems(flight: Flight) -> list[Problem]:
-    """Why the flight cannot start, which is tried in the steady wind. Of its airframe `problems` tells.
+    """Why the flight cannot start, which is tried in the steady wind. Airframe mistakes are reported by `problems`.
 
-    A model of somebody else may end the process that loads it, so this is tried in a child.
+    A third-party model may crash the process that loads it, so this is tried in a child process.
     """
     if list(_airframe_problems(flight)):
         return []
@@ -50,7 +50,7 @@ def start_problems(flight: Flight) -> list[Problem]:
 
 
 def model_of_another(flight: Flight) -> Path | None:
-    """The JSBSim model that the flight flies, if it does not come with the harness: such a model may do anything.
+    """The third-party JSBSim model of the flight, which may crash or hang; None for the harness's own airframes.
 
     Raises FileNotFoundError for an unknown airframe.
     """
@@ -99,7 +99,7 @@ def problems(flight: Flight) -> list[Problem]:
 
 
 def _period_problems(flight: Flight) -> Iterator[Problem]:
-    """Of the steps, the guidance periods and the duration: a multiple each of the one before, and not too many."""
+    """Mistakes of step, guidance period and duration: each must be a multiple of the one before, and not too long."""
     step, period, duration = flight.step, flight.guidance_period, flight.duration
     if not _is_multiple(period, step):
         yield Problem("guidance_period", _no_multiple(period, "step_s", step), ("step",))
@@ -133,7 +133,7 @@ def _error_problems(flight: Flight) -> Iterator[Problem]:
     if delay and not _is_multiple(delay, step):
         yield Problem("errors.command_delay", _no_multiple(delay, "step_s", step), ("step",))
     if 0.0 < lag < 0.5 * step:
-        quick = f"{lag:g} s is too quick for steps of {step:g} s: 0 or half a step"
+        quick = f"{lag:g} s is too short for steps of {step:g} s: 0 or half a step"
         yield Problem("errors.actuator_lag", quick, ("step",))
 
 

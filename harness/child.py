@@ -40,7 +40,7 @@ class ChildError(HarnessError, RuntimeError):
 
 
 def in_child(stage: str, function: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
-    """What the function returns, or raises, in a process with the limits `SECONDS` and `MEMORY`. Raises `ChildError`.
+    """The result or error of a function in a process with the limits `SECONDS` and `MEMORY`. Raises `ChildError`.
 
     The function and all that goes there and back must be picklable. The process writes no file, does not hear Ctrl-C,
     and ends with this one. `stage` says in an error what was done.
@@ -76,7 +76,7 @@ def limited(
 
 
 def how_ended(code: int | None) -> str:
-    """What the exit code of a process says, as the end of a sentence."""
+    """The meaning of a process's exit code, as the end of a sentence."""
     if code is not None and code < 0:
         names = {each.value: each.name for each in signal.Signals}
         return f"was ended by {names.get(-code, f'signal {-code}')}"
@@ -184,7 +184,7 @@ _told: dict[str, Any] = {}  # where to answer, the limit in s, and when it was l
 
 
 def alive(*_: object) -> None:
-    """Tells the parent that the function goes on, in a child; elsewhere nothing happens."""
+    """Reports progress to the parent, in a child; elsewhere it has no effect."""
     if _told and time.monotonic() > _told["at"] + _TELL_EVERY:
         _told["at"] = time.monotonic()
         _limit_time(_told["seconds"])

@@ -48,7 +48,7 @@ class Picture(Figure):
 
 
 def picture(paint: Callable[[Figure], None], width: float = PAGE, height: float = 4.0) -> Picture:
-    """What `paint` draws on a figure of this size, in inches, in the style of print."""
+    """The figure drawn by `paint`, of this size in inches, in the style of print."""
     with _in_print():
         figure = Picture(figsize=(width, height), dpi=110, layout="constrained")
         paint(figure)

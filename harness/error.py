@@ -5,11 +5,11 @@ from difflib import get_close_matches
 
 
 class HarnessError(Exception):
-    """The base of the harness's errors: what was given cannot be used."""
+    """The base of the harness's errors: an input cannot be used."""
 
 
 class SettingsError(HarnessError, ValueError):
-    """What is wrong with the settings, one line for each mistake: `lines`."""
+    """Mistakes in the settings, one line for each: `lines`."""
 
     def __init__(self, lines: Sequence[str]) -> None:
         super().__init__("\n".join(lines))
@@ -21,7 +21,7 @@ class ArgumentError(HarnessError, ValueError):
 
 
 class RecordingError(HarnessError, OSError, ValueError):
-    """A recording that cannot be read or written, or does not hold what is asked for."""
+    """A recording that cannot be read or written, or does not contain the requested flight."""
 
 
 def did_you_mean(word: object, known: Iterable[str]) -> str:

@@ -33,9 +33,9 @@ def relative_speed(flight: Flight) -> float:
 
 
 def is_outrun(flight: Flight) -> bool:
-    """Whether air and target move against each other as fast as the aircraft flies, or faster.
+    """Whether the wind relative to the target reaches the airspeed.
 
-    Nothing circles such a target: where the air comes from ahead, the aircraft does not get round.
+    No law can circle such a target: in the headwind the aircraft makes no progress.
     """
     return relative_speed(flight) >= flight.start.airspeed * (1.0 - 1e-9)  # less is rounding
 
@@ -50,7 +50,7 @@ def needed_rates(flight: Flight, wind: Array, target_velocity: Array) -> Array:
     """The largest rate needed to hold the circle in each of these winds and at each velocity of the target, m/s.
 
     Both have rows of (north, east), or one is a single pair. The rate is of the quantity that the law limits, rad/s,
-    and infinite where the aircraft does not get round. The heading rate is (v_a + w)^2 / (v_a R_d), with w the relative
+    and infinite where no rate holds the circle. The heading rate is (v_a + w)^2 / (v_a R_d), with w the relative
     speed. The course rate needed is smaller: with a target at rest it is (v_a + w) / R_d.
     """
     v_a, R_d = flight.start.airspeed, flight.law.standoff
@@ -110,9 +110,9 @@ def feasibility_line(flight: Flight) -> str:
 
 
 def warnings(flight: Flight, *, of_circle: bool = True) -> list[str]:
-    """Sentences that a user should know before trusting the flight, which can be flown all the same.
+    """Warnings on the conditions of the flight, which can still be flown.
 
-    With `of_circle` also that the circle is infeasible, which `feasibility_line` says.
+    With `of_circle` also that the circle is infeasible, which `feasibility_line` reports.
     """
     sentences = []
     v_a = flight.start.airspeed

@@ -1,4 +1,4 @@
-"""The fence around a JSBSim model, which is a program: what passes it reads and writes no file, and opens no socket.
+"""The check of a JSBSim model, which is a program: a model that passes reads and writes no file, and opens no socket.
 
 JSBSim would write any file that a model names, listen on a port, and end the process on some; so a model is read here
 first. `fenced` makes one tree of a model and of the files beside it; `checked` reads a model that is about to fly.
@@ -32,7 +32,7 @@ _MASSES = ("emptywt", "ixx", "iyy", "izz")
 
 
 class FenceError(HarnessError, ValueError):
-    """What a model may not have, in one line: `FILE:LINE: what is wrong, what is allowed`."""
+    """A forbidden or invalid part of a model, in one line: `FILE:LINE: what is wrong, what is allowed`."""
 
 
 class Tag(ElementTree.Element):
@@ -196,7 +196,7 @@ class _Fencing:
 
 
 def _content(file: Path) -> bytes:
-    """What a plain file of a bearable size holds."""
+    """The content of a plain file of limited size."""
     try:
         if file.exists() and not file.is_file():
             raise FenceError(f"{file}: must be a file")
@@ -322,7 +322,7 @@ def _numbers(text: str | None) -> list[float]:
 
 
 def _name(property_: ElementTree.Element) -> str:
-    """What JSBSim knows the property by."""
+    """The name of the property in JSBSim."""
     return (property_.text or "").strip().replace("[0]", "")
 
 

@@ -57,7 +57,7 @@ def as_text(text: str) -> str:
 
 
 def is_text(path: Path) -> bool:
-    """Whether the name is Unicode, as far as the locale tells."""
+    """Whether the name is Unicode, according to the locale."""
     return as_text(str(path)) == str(path)
 
 

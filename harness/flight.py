@@ -75,7 +75,7 @@ class Flight:
 
 
 def setup_of(flight: Flight) -> Setup:
-    """What the flight's plant is made from. Raises FileNotFoundError for an unknown airframe."""
+    """The inputs from which the flight's plant is made. Raises FileNotFoundError for an unknown airframe."""
     airframe = aircraft.folder(flight.aircraft)
     return Setup(airframe, flight.start.airspeed, flight.step, flight.inner_loop.rate_trim, flight.errors)
 
@@ -86,13 +86,13 @@ def plant_of(flight: Flight) -> Plant:
 
 
 def command_delay(flight: Flight) -> tuple[int, float]:
-    """How late the plant gets the commands: so many whole guidance periods, and a part of one, s."""
+    """The transport delay of the command: whole guidance periods, and a part of one, s."""
     whole, steps = divmod(round(flight.errors.command_delay / flight.step), round(flight.guidance_period / flight.step))
     return whole, steps * flight.step
 
 
 def context_of(flight: Flight) -> Context:
-    """What the flight's law knows before it flies; the response of an airframe that is not identified is None."""
+    """The context of the flight's law; the response of an airframe that is not identified is None."""
     response = None
     if uses_response(flight.law):
         with suppress(PlantError, FileNotFoundError):

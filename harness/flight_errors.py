@@ -1,4 +1,4 @@
-"""Errors of a flight: what law, command and aircraft have wrong. The settings `[flight.errors]`, neutral by default."""
+"""Errors of measurement, command and aircraft in a flight: the settings `[flight.errors]`, neutral by default."""
 
 import math
 from dataclasses import dataclass, fields
@@ -11,7 +11,7 @@ from autopilot.quantities import About, Degrees, MetresPerSecond, Seconds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
-    """What is wrong in a flight, for every law alike. SI, rad. The defaults change no bit of a flight."""
+    """The errors of a flight, the same for every law. SI, rad. With the defaults a flight is bit-identical."""
 
     wind: Annotated[MetresPerSecond, Ge(0), Le(100), About("magnitude of the error of the law's wind estimate")] = 0.0
     wind_heading: Annotated[

@@ -1,4 +1,4 @@
-"""What a notebook calls, where that takes several rooms: fly, record, read back, run a matrix."""
+"""The functions of the Python interface: fly, record, read back, run a matrix."""
 
 import os
 import sys
@@ -33,11 +33,11 @@ def law(name: str, gains: str | None = None, *, flight: Flight | None = None, **
 
     `parameters` override single gains and what all laws have: `standoff` (m), `max_heading_rate` (rad/s, not degrees),
     `direction`, `airspeed`, `command`. `harness list laws` shows all of them. A gain set that follows from a rule needs
-    the `flight` for whose circle, airspeed, period and airframe it is calculated. A law of your own is named by its
-    file, "FILE.py:CLASS" from the working folder, or as "MODULE:CLASS".
+    the `flight` for whose circle, airspeed, period and airframe it is calculated. A user-defined law is named by its
+    file, "FILE.py:CLASS" relative to the working folder, or as "MODULE:CLASS".
 
-    Raises `ArgumentError` for a law, a gain set or a parameter that there is not, with those that there are;
-    and for a rule that has no answer; FutureWarning for the former name of a gain set.
+    Raises `ArgumentError` for an unknown law, gain set or parameter (the message lists the known ones) and for a rule
+    without a result; FutureWarning for the former name of a gain set.
 
     >>> harness.law("nftsm")
     >>> harness.law("nftsm", "paper_1", k2=4.0, max_heading_rate=math.radians(10.0))
@@ -60,15 +60,15 @@ def simulate(flight: Flight, watch: "Watch | None" = None) -> FlightLog:
     """Flies the flight and returns its log: how it ended, and one row per guidance period.
 
     A flight that ends early (it hits the ground, loses the target, a law raises) is a result: see `log.outcome` and
-    `log.reason`. The same flight gives the same bits each time.
+    `log.reason`. Repeated flights are bit-identical.
 
     `watch(time, so_far)` is called after each row with the time in s and a function that returns the log so far.
 
-    It is flown in this process, also on a JSBSim model that does not come with the harness; such a model is a program
-    and may end the process. `run`, with workers, and `harness fly` fly it in a process of its own.
+    It is flown in this process, also on a third-party JSBSim model; such a model is a program and may crash the
+    process. `run`, with workers, and `harness fly` fly it in a separate process.
 
-    Raises `SettingsError` when the flight cannot be flown as it is set, with one line for each mistake in the keys and
-    units of a settings file; `PlantError` when the aircraft cannot start so.
+    Raises `SettingsError` if the settings are invalid, with one line for each mistake in the keys and units of a
+    settings file; `PlantError` if the aircraft cannot start with them.
 
     >>> flight = harness.Flight(plant="sixdof", law=harness.law("nftsm", "paper_1"))
     >>> log = harness.simulate(flight)
@@ -78,10 +78,10 @@ def simulate(flight: Flight, watch: "Watch | None" = None) -> FlightLog:
 
 
 def metrics(log: FlightLog) -> dict[str, float | bool | None]:
-    """The numbers that a flight is judged by, each by its name with the unit as suffix; `log.metrics` is the same.
+    """The metrics of a flight by name, with the unit as suffix; equal to `log.metrics`.
 
-    A metric is None where the plant has no such thing (a kinematic aircraft has no bank), or the flight does not show
-    it (it never converged). `harness list metrics` says what each means.
+    A metric is None if the plant has no such quantity (a kinematic aircraft has no bank), or the flight does not have
+    it (it never converged). `harness list metrics` prints their meaning.
 
     >>> harness.metrics(log)["range_error_rms_m"]
     """
@@ -91,11 +91,11 @@ def metrics(log: FlightLog) -> dict[str, float | bool | None]:
 def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title: str = "", notes: str = "") -> Path:
     """Writes one flight, or several by name, into a Rerun recording (`.rrd`) and returns its path, whole or not at all.
 
-    Of several the first is the reference; of two it is drawn wide and pale. `notes` is Markdown, shown above the
-    results. `harness view PATH` shows it, `read_flight(PATH)` reads it back.
+    The first flight is the reference; with two flights it is drawn wide and pale. `notes` is Markdown, shown above the
+    results. `harness view PATH` shows the recording, `read_flight(PATH)` reads it back.
 
-    Raises `RecordingError` when it cannot be written, or for more flights than can be told apart; `SettingsError` for a
-    law that has no name.
+    Raises `RecordingError` if it cannot be written, or for more flights than there are colours; `SettingsError` for a
+    law without a name.
 
     >>> harness.record(log, "flight.rrd")
     >>> harness.record({"kinematic": kinematic, "sixdof": sixdof}, "pair.rrd", title="The same flight twice")
@@ -112,7 +112,7 @@ def record(log: FlightLog | Mapping[str, FlightLog], path: str | Path, *, title:
 
 
 def show(log: FlightLog, *others: FlightLog) -> Any:
-    """What a notebook shows of one flight, or of several over each other: see `FlightLog.show`."""
+    """The view of one flight, or of several overlaid, in a notebook: see `FlightLog.show`."""
     from harness.log.figure import named
     from harness.review.notebook import viewer
 
@@ -124,7 +124,7 @@ def show(log: FlightLog, *others: FlightLog) -> Any:
 
 
 def read_flight(path: str | Path, flight: str | None = None) -> "pd.DataFrame":
-    """The log of a recorded flight, bit for bit as `FlightLog.frame()` gave it: one row per guidance period.
+    """The log of a recorded flight, bit-identical to `FlightLog.frame()`: one row per guidance period.
 
     `flight` names it where the file holds several. Columns as in `FlightLog`: SI, rad, north-east-down.
 
@@ -154,28 +154,27 @@ def run(
 ) -> "pd.DataFrame":
     """Flies the matrix of a settings file into a directory, and returns its results as `load_results` does.
 
-    What was flown before is not flown again, so the same call goes on where it was interrupted: finished flights are
-    kept, whatever ends it.
+    Finished flights are kept and not flown again, so the same call resumes an interrupted run.
 
-    - `out`: the directory of the results, made where there is none.
+    - `out`: the directory of the results, created if missing.
     - `workers`: processes; None is one per processor, 0 flies in this process. A script that uses workers must call
-      this under `if __name__ == "__main__":`, as Python's multiprocessing asks; a notebook need not.
-    - `limit`: only the first so many flights of the matrix.
+      this under `if __name__ == "__main__":`, as Python's multiprocessing requires; a notebook need not.
+    - `limit`: the number of flights to fly, the first ones of the matrix.
     - `log`: which flights are recorded in OUT/flights: "all", "sample", "failed" or "none"; None is all of up to 50,
       else a sample.
     - `overrides`: texts KEY=VALUE that set a key for all flights, as `--set` of the command line does.
-    - `retry_failed`: fly those again that are invalid; those that timed out or lost their worker are in any case.
-    - `timeout`: a flight hangs, and is ended, when it gains no simulated time while its worker computes for so many s;
-      None is 60.
-    - `engine`: "python" or "compiled"; None is compiled where that can be and is quicker. The results are the same.
+    - `retry_failed`: fly invalid flights again; flights that timed out or lost their worker always are.
+    - `timeout`: process time, s, without progress of the simulated time, after which a flight is ended as hung; None is
+      60.
+    - `engine`: "python" or "compiled"; None is compiled if possible and faster. The results are identical.
     - `dask`: fly on a Dask cluster instead of processes of this machine: the address or the file of its scheduler, as
       `--dask` of the command line; see the guide "Many machines".
-    - `progress`: print how far it is to standard error, once a second.
+    - `progress`: print the progress to standard error, once a second.
 
-    Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` when the directory cannot be
-    used; `WorkersError` when the processes cannot fly; `ArgumentError` for an option that there is not;
-    `HarnessError` for flights that the engine "compiled" cannot fly, and for a cluster that cannot be used. A flight
-    that fails is a row, not an error.
+    Raises `SettingsError` with every mistake in the file, each with its line; `StoreError` if the directory cannot be
+    used; `WorkersError` if the processes cannot fly; `ArgumentError` for an invalid option; `HarnessError` for flights
+    that the engine "compiled" cannot fly, and for a cluster that cannot be used. A flight that fails is a row, not an
+    error.
 
     >>> results = harness.run("experiments/gains.toml", out="out/gains", progress=True)
     >>> results.groupby("plant")["convergence_time_s"].median()
@@ -229,7 +228,7 @@ def run(
 
 @contextmanager
 def _recording(path: Path) -> Iterator[None]:
-    """What goes wrong with a recording, as a `RecordingError`."""
+    """Raises errors of a recording as `RecordingError`."""
     try:
         yield
     except HarnessError:
@@ -241,7 +240,7 @@ def _recording(path: Path) -> Iterator[None]:
 
 
 def _printed(states: "Iterator[Progress]") -> "Iterator[Progress]":
-    """The same, with a line on standard error once a second and at the end."""
+    """The states, with a line on standard error once a second and at the end."""
     due = time.monotonic()
     state = None
     for state in states:

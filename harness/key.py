@@ -51,7 +51,7 @@ def identity(flight: Flight) -> Identity:
 
 
 def _of_folder(airframe: str) -> dict[str, str]:
-    """What a folder with an airframe is known by, wherever it lies; by its name alone where it is gone."""
+    """The identity of an airframe's folder, independent of its place; only its name if it is missing."""
     try:
         folder = aircraft.folder(airframe)
         data = folder if aircraft.is_recorded(folder) else folder / "airframe.toml"

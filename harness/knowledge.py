@@ -1,4 +1,4 @@
-"""What the law knows at each guidance step: of its own aircraft and the wind, with errors, and of the target."""
+"""The law's observations at each guidance step: measurements of its aircraft and the wind, and the estimated target."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ _AHEAD = 1000  # guidance steps
 
 
 class Instruments:
-    """What the law knows of its own aircraft, with the errors of one flight; `wind` is its estimate, m/s, north, east.
+    """The law's measurements, with the errors of one flight; `wind` is the estimated wind, m/s, north, east.
 
     The noise of the course depends on the seed and the number of the guidance step alone.
     """
@@ -58,7 +58,7 @@ def heading_in(wind: tuple[float, float], velocity_north: float, velocity_east: 
 
 
 class Sighting(NamedTuple):
-    """What decides the estimates of a flight: neither its plant nor its law. Fields as of `Flight`."""
+    """The settings that decide the estimates of a flight, without plant and law. Fields as in `Flight`."""
 
     estimator: Estimator
     target: Target
@@ -69,7 +69,7 @@ class Sighting(NamedTuple):
 
 
 def sighting(flight: Flight) -> Sighting:
-    """That of this flight."""
+    """The `Sighting` of this flight."""
     return Sighting._make(getattr(flight, name) for name in Sighting._fields)
 
 

@@ -30,7 +30,7 @@ def simulate(
     """Flies the flight and returns its log, whatever its outcome.
 
     `watch` is called after each row of the log and may take its time. `plant` flies in place of the plant that the
-    flight names, and `context` is then what its law is told of it. Raises ValueError for settings that contradict each
+    flight names, and `context` is then the law's context. Raises ValueError for settings that contradict each
     other, `PlantError` when the plant cannot start.
     """
     for problem in problems(flight):
@@ -86,10 +86,10 @@ def simulate(
 def observe(
     state: State, nominal_airspeed: float, wind: tuple[float, float], estimate: TargetState, time: float = 0.0
 ) -> Observation:
-    """What the law gets to know: its aircraft's state, as measured, the estimated steady wind and target. SI, rad.
+    """The law's observation: the measured state of its aircraft, the estimated steady wind and target. SI, rad.
 
     Its heading psi_a is measured alike on every plant, as the direction of (ground velocity - estimated wind). In gusts
-    this differs from the psi_a of Eq. (1): a law that saw the latter would miss how the gusts carry the aircraft.
+    this differs from the psi_a of Eq. (1), with which a law would not see the drift by gusts.
     """
     W_x, W_y = wind
     if state.wind_north != W_x or state.wind_east != W_y:
@@ -125,7 +125,7 @@ def command(law: LawStep, observation: Observation) -> Guidance:
 
 
 def channels_of(told: Mapping[int, Mapping[str, float]], rows: int) -> dict[str, NDArray[np.float64]]:
-    """The law's own channels as columns, (rows,), by the names of a log; NaN where the law did not tell."""
+    """The law's own channels as columns, (rows,), by the names of a log; NaN if the law did not report one."""
     columns = {f"law_{name}": np.full(rows, math.nan) for channels in told.values() for name in channels}
     for row, channels in told.items():
         if row < rows:

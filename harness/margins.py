@@ -18,7 +18,7 @@ DegreesPerSecond2 = Annotated[float, Unit("deg_s2", math.pi / 180.0)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assess:
-    """What counts as holding. Relative ones and shares are numbers; the rest in SI, rad."""
+    """The margins of the verdict. Relative ones and shares are numbers; the rest in SI, rad."""
 
     airspeed_deviation: Annotated[
         float, Gt(0), About("rms over nominal airspeed. Ours: 5 % of airspeed is 5 % of turn rate at the same bank")

@@ -52,7 +52,7 @@ def living() -> list[BaseProcess]:
 
 
 def computed(jobs: Sequence[Callable[[], Result]], workers: int) -> Iterator[Result]:
-    """What the jobs return, each as soon as it is there, so in any order; with one worker in this process, in theirs.
+    """The results of the jobs as they complete, in any order; with one worker in this process, in their order.
 
     A job must be importable in a worker: a function, or a `partial` of one. Closing the generator ends every worker;
     what a job raises is raised here.

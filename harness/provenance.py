@@ -99,7 +99,7 @@ def processor() -> str:
 
 
 def decides_bits() -> dict[str, str]:
-    """What decides the last bits of a flight beside code and settings, here: where all is equal, all bits are."""
+    """The environment that decides the last bits of a flight beside code and settings: equal ones give equal bits."""
     return _decides_bits(processor(), platform.python_version(), packages())
 
 
@@ -114,7 +114,7 @@ def _decides_bits(processor: str | None, python: str, packages: Mapping[str, str
 
 
 def differences(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
-    """What decides the last bits and is not as it was, in words; what is not known of both counts as equal."""
+    """The changes of that environment, in words; what is unknown of either counts as equal."""
     for name in then:
         if name in now and now[name] != then[name]:
             yield f"{name} {then[name]} there, {now[name]} here"

@@ -1,4 +1,4 @@
-"""A requirement on a flight, `NAME OP VALUE`: on how it ended, its metrics, and what is known beforehand."""
+"""A requirement on a flight, `NAME OP VALUE`: on its outcome, its metrics, and predictions that need no flight."""
 
 import math
 import operator
@@ -15,11 +15,11 @@ from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.plant import Outcome
 
 Fact = float | bool | str | None  # None: unknown, or there is no such thing
-Facts = Mapping[str, Fact]  # what is known of a flight: the outcome, its metrics, and what is foreseen of it
+Facts = Mapping[str, Fact]  # outcome, metrics and predictions of a flight
 
 OUTCOME = "outcome"
 FEASIBILITY = "feasibility_margin_deg_s"
-FORESEEN = (FEASIBILITY, *PREDICTED)  # known without a flight
+FORESEEN = (FEASIBILITY, *PREDICTED)  # predictions that need no flight
 
 _EQUALITY: Mapping[str, Callable[[object, object], bool]] = MappingProxyType({"=": operator.eq, "!=": operator.ne})
 _ORDER: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
@@ -34,12 +34,12 @@ class RequirementError(HarnessError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What is asked of each flight. What is unknown does not meet it."""
+    """A requirement on each flight. An unknown value does not meet it, unless `where_known`."""
 
     name: str
     operator: str
     value: float | bool | str
-    where_known: bool = False  # then it does
+    where_known: bool = False  # whether an unknown value meets it
 
     def __str__(self) -> str:
         value = f"{self.value:g}" if isinstance(self.value, float) else str(self.value)
@@ -106,7 +106,7 @@ def known_name(name: str) -> str:
 
 
 def foreseen(flight: Flight, names: Collection[str] = FORESEEN) -> dict[str, Fact]:
-    """What is known of a flight without flying it; at least those of `FORESEEN` that are named."""
+    """The predictions for a flight; at least those of `FORESEEN` that are named."""
     facts: dict[str, Fact] = {FEASIBILITY: math.degrees(feasibility_margin(flight))}
     if named := [name for name in PREDICTED if name in names]:
         facts.update(predicted(flight, named))

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 
 class Verdict(StrEnum):
-    """What the evidence says of a statement."""
+    """The verdict on a statement."""
 
     HOLDS = "holds"
     HOLDS_IF = "holds if"  # the condition follows; without it the statement fails, or is undecided

@@ -230,7 +230,7 @@ def test_a_lag_of_telemetry_is_a_bound_and_one_on_board_an_interval() -> None:
     bound = assess(replace(on_board, of_receipt=True))[BANK.lag.title]
     assert bound.word == Verdict.UNDECIDED
     assert bound.low == 0.0
-    assert "age of the telemetry" in bound.reason
+    assert "latency of the telemetry" in bound.reason
 
 
 def test_a_command_at_rest_does_not_tell_the_lag() -> None:
@@ -281,7 +281,7 @@ def test_a_command_the_wrong_way_round_is_turned_and_said(of: Commanded) -> None
     right, found = assess(flight), assess(flight.changed(np.negative, of.command))
     assert right[of.lag.title].word == Verdict.FAILS
     assert [found[part.title] for part in (of.gain, of.lag)] == [right[part.title] for part in (of.gain, of.lag)]
-    said = f"{of.noun} command: the sign is the wrong way round beside the {of.flown}'s; turned"
+    said = f"{of.noun} command: the sign is opposite to the {of.flown}'s; inverted"
     assert said in found.notes
     assert said not in right.notes
 
@@ -416,4 +416,4 @@ def test_no_model_flies_beside_a_log_that_does_not_tell_how(fitted: Path) -> Non
         beside(found, fitted)
     short = invoke("assess", "experiments/flights/lateral_doublet_4.csv", "--airframe", "skywalker_x8")
     assert short.exit_code == 2
-    assert "it does not tell bank and wind" in str(short.exception) + short.output
+    assert "it gives no bank and wind" in str(short.exception) + short.output

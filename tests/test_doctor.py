@@ -35,7 +35,7 @@ def test_a_package_that_cannot_be_loaded_or_is_too_old_is_missing_and_hides_noth
     done = doctor({"PYTHONPATH": f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"})
     assert done.returncode == 1
     missing = [line.split(maxsplit=2)[1:] for line in done.stdout.splitlines() if line.startswith("MISSING")]
-    assert ["filterpy", "1.4, needed is >=2.0"] in missing
+    assert ["filterpy", "1.4, required is >=2.0"] in missing
     (why,) = (text for name, text in missing if name == "pebble")
     assert why.endswith("cannot be loaded: ImportError: libpebble.so: cannot open shared object file")
     assert "stored flights" in done.stdout

@@ -62,7 +62,7 @@ def test_a_flight_says_for_how_long_its_circle_could_not_be_held(tmp_path: Path)
     segments = "[{ from_s = 1.0, to_s = 3.0, acceleration_mps2 = 8.0 }]"
     text = f'[flight]\nplant = "kinematic"\nduration_s = 5.0\nlaw.name = "smc"\ntarget.segments = {segments}\n'
     told = invoke("fly", write(tmp_path / "a.toml", text)).stdout
-    assert "For 3.7 s of it the circle could not be held: air and target ask more than the command's limit." in told
+    assert "For 3.7 s the circle was infeasible: wind and target required more than the command limit." in told
     calm = invoke("fly", write(tmp_path / "b.toml", text.replace("8.0", "0.1"))).stdout
     assert "could not be held" not in calm
 

@@ -161,7 +161,7 @@ def test_a_law_is_told_a_response_quicker_than_the_identified_one() -> None:
         ({"command_delay_s": 11.0}, "flight.errors.command_delay_s"),
         ({"mass_scale": 0.0}, "flight.errors.mass_scale"),
         ({"cg_aft": -1.5}, "flight.errors.cg_aft"),
-        ({"actuator_lag_s": 0.001}, "flight.errors.actuator_lag_s: 0.001 s is too quick for steps of 0.005 s"),
+        ({"actuator_lag_s": 0.001}, "flight.errors.actuator_lag_s: 0.001 s is too short for steps of 0.005 s"),
     ],
 )
 def test_an_error_out_of_bounds_is_refused(errors: dict[str, float], message: str) -> None:

@@ -250,7 +250,10 @@ def test_one_component_of_a_vector_is_a_key(file: Path) -> None:
         (["--x", "law.k2=1:5", "--of", "chatter"], "--of 'chatter': must be converged, outcome, a metric, or"),
         (["--x", "law.k2=1:5", "--of", "limit_cycle_margin < 1"], "is known without a flight"),
         (["--x", "law.k2=1:5", "--resolution", "3"], "--resolution is 3, must be from 10 to 2000"),
-        (["--x", "law.k2=1:5", "--flights", "3"], "--flights is 3, must be 676 at least, which is the first round"),
+        (
+            ["--x", "law.k2=1:5", "--flights", "3"],
+            "--flights is 3, must be 676 at least, which is the first, coarse lattice",
+        ),
         (["--x", Y], f"--y {Y}: start.heading_deg is given twice"),
         (["--x", "wind.steady_mps.up=1:5"], "flight.wind.steady_mps: is { up = "),
     ],

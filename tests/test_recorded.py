@@ -165,7 +165,7 @@ def test_what_is_wrong_with_the_rows_of_a_csv_is_said(tmp_path: Path) -> None:
     longer = {name: np.append(column, column[:20] + 4000.0 * (name == "t")) for name, column in COLUMNS.items()}
     longer["t"] = put(10, 9e6)(longer["t"].copy())
     late = told(tmp_path, changed("t", put(10, 310.0)))
-    assert "1 of 80 rows come up to 0.14 s too late, and are put in order" in late
+    assert "1 of 80 rows are out of order by up to 0.14 s, and are sorted" in late
     assert "1 of 100 rows have a time far off" in told(tmp_path, longer)
     back = changed("t", lambda t: np.where(t < 2000.0, t + 5000.0, t))
     assert "the clock goes back at row 41 from 1.95 s to -3.00 s after its first" in told(tmp_path, back)
@@ -289,7 +289,7 @@ def test_a_command_that_repeats_what_is_flown_is_none(tmp_path: Path) -> None:
     letters, table = MESSAGES["ATT"]
     flight = read_log([write_dataflash(tmp_path / "a.bin", {"ATT": (letters, {**table, "DesRoll": table["Roll"]})})])
     assert "bank_command" not in flight
-    assert "bank_command repeats what is flown" in flight.problems[-1]
+    assert "bank_command repeats the flown values" in flight.problems[-1]
 
 
 @pytest.mark.parametrize("kind", ["ulog", "dataflash", "csv"])

@@ -87,7 +87,7 @@ def test_a_flight_of_several_runs_is_kept_once_and_different_bits_are_told(file:
         journal.execute("UPDATE flights SET digest = 'other' WHERE key = ?", (key,))
     done = invoke("merge", first, other, "--out", tmp_path / "apart")
     assert f"1 flown by several runs with different bits ({key[:8]}): the first run's are kept" in done.output
-    assert "3 flown by several runs, with the same bits: kept once" in done.output
+    assert "3 flown by several runs, bit-identical: kept once" in done.output
     assert "other" not in harness.load_results(tmp_path / "apart")["digest"].to_list()
 
 

@@ -387,5 +387,5 @@ def test_flights_that_would_tell_two_axes_apart_are_printed_as_options() -> None
     flights = shifted(flights, "sideslip_rms_deg", 5.0, where={"law.max_heading_rate_deg_s": 20.0})
     flights = shifted(flights, "sideslip_rms_deg", 0.5, where={"law.max_heading_rate_deg_s": 5.0})
     text = "\n".join(lines(compared(flights)))
-    assert "Flights that would tell apart what varies together:" not in text  # one axis follows the other: it is one
+    assert "Flights that would separate what varies together:" not in text  # one axis follows the other: it is one
     assert "no sideslip holds if" in text

@@ -111,7 +111,7 @@ def adopt(name: str, out: Path, wish: Wish, seconds: float = SECONDS) -> Iterato
 
 
 def _done(stage: str, adoption: Adoption, end: float, seconds: float) -> Found:
-    """What a stage finds in a process of its own, until `end`. Raises `RefusalError` for all that goes wrong there."""
+    """The result of a stage in a separate process, until `end`. Raises `RefusalError` for any failure there."""
     left = max(1.0, end - time.monotonic())
     if is_short := stage == "load" and left > LOADING:
         left = LOADING
@@ -176,7 +176,7 @@ def _seconds_of_a_step(tunnel: WindTunnel) -> float:
 
 
 def _told(a: Adoption, fdm: Fdm) -> dict[str, str]:
-    """Of each property of FlightGear that the model names and does not write, the one of JSBSim that it follows."""
+    """JSBSim's substitute for each property of FlightGear that the model reads and does not write."""
     names = {name.replace("[0]", "") for name in a.names} - set(a.writers)
     sources = {name: source for name in names if (source := cockpit.source_of(name))}
     missing = unknown(fdm, [source.lstrip("-") for source in sources.values()])
@@ -237,7 +237,7 @@ def _model(a: Adoption) -> Element:
 
 
 def _held_back(tunnel: WindTunnel) -> Iterator[str]:
-    """What keeps the engines from pushing forwards at full throttle."""
+    """Possible causes of missing forward thrust at full throttle."""
     fdm = tunnel.fdm
     for i in range(tunnel.engines):
         limiter, power = (f"propulsion/engine[{i}]/{name}" for name in ("ielu_intervent", "power-hp"))

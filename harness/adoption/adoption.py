@@ -1,4 +1,4 @@
-"""What is known of a model while it is adopted, and the files that come of it: what the harness flies it by."""
+"""The state of an adoption, and the files of an adopted aircraft."""
 
 import json
 import math
@@ -27,18 +27,18 @@ _TEMPLATE = "inner_loop.xml.jinja"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wish:
-    """What the user asks of an adoption. SI, rad; an airspeed of None is found."""
+    """The user's options of an adoption. SI, rad; an airspeed of None is found."""
 
     airspeed: float | None = None
     altitude: float = 1000.0
     max_bank: float = math.radians(35.0)
-    bandwidth: float | None = None  # rad/s, of the bank's loop; as quick as the aircraft allows
+    bandwidth: float | None = None  # rad/s, target of the bank loop; None: the highest that the aircraft allows
     controls: Mapping[str, Any] | None = None  # names of properties
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adoption:
-    """What the stages have found so far. SI, rad."""
+    """The results of the stages so far. SI, rad."""
 
     name: str
     wish: Wish

@@ -1,6 +1,6 @@
-"""What FlightGear tells a model that flies there: its cockpit's controls, and what its instruments show of the engines.
+"""FlightGear's properties of cockpit controls and engine instruments, which a model may read.
 
-A model that reads such a property finds nobody here who writes it, so an adopted model is told by JSBSim's own.
+Such a property has no writer outside FlightGear, so an adopted model reads JSBSim's own in its place.
 """
 
 import re

@@ -1,7 +1,7 @@
 """The gains of an adopted model's inner loop, from its derivatives by one rule for all, from a light biplane to a jet.
 
-The bank's loop is placed with a damping ratio of 0.8, as quick as is wanted and as aileron, its hysteresis and its
-actuator allow; then slower, down to 0.4 of that, until every oscillation of the linear loop is damped enough.
+The bank loop is placed with a damping ratio of 0.8 and the requested bandwidth, as far as aileron, its hysteresis and
+its actuator allow; then with less bandwidth, down to 0.4 of that, until every mode of the linear loop is damped enough.
 """
 
 import math
@@ -40,14 +40,14 @@ class LoopDesign:
     gain: Mapping[str, float]
     limit: Mapping[str, float]
     adopted: Mapping[str, float]
-    bandwidth: float  # rad/s, of the bank's loop
+    bandwidth: float  # rad/s, of the bank loop
     limited_by: str
-    damping: float  # of the least damped oscillation of the linear loop
-    max_bank: float  # rad: what was asked, or what rudder and aileron coordinate
+    damping: float  # of the least damped mode of the linear loop
+    max_bank: float  # rad: the requested bank, or the largest that rudder and aileron can coordinate
 
     @property
     def lag(self) -> float:
-        """How late the bank follows its command, s."""
+        """Lag of the bank behind its command, s."""
         return 2.0 * ZETA / self.bandwidth
 
 
@@ -221,7 +221,7 @@ def _closed_lateral(linear: Linear, gains: _Lateral) -> Array:
 
 
 def _turn_lag(linear: Linear, gains: _Lateral, bandwidth: float) -> float:
-    """How late the yaw rate follows the command of the bank, s: the mean delay, for which the rate trim must wait.
+    """Lag of the yaw rate behind the bank command, s: the mean delay, which limits the rate trim.
 
     At a large angle of attack the nose goes ahead of the course while the aircraft rolls in, and the lag is short.
     """

@@ -20,7 +20,7 @@ _ANGLE, _RATE, _SPEED, _COMMAND = math.radians(0.5), math.radians(1.0), 0.01, 0.
 
 
 class Surface(NamedTuple):
-    """What its command does: accelerations, m/s^2 and rad/s^2; lag, s; and the command below which little moves."""
+    """The effect of a command: accelerations, m/s^2 and rad/s^2; lag, s; and the dead zone of the command."""
 
     effect: Array
     lag: float

@@ -1,4 +1,4 @@
-"""What an adopted model is flown through before it counts as adopted: a change of course by 90 deg, and a circle."""
+"""The manoeuvres that an adopted model must fly: a change of course by 90 deg, and a circle."""
 
 import math
 from collections.abc import Mapping
@@ -46,7 +46,7 @@ class Turned:
     rate: float  # heading rate over its command of one lag before, in the middle of the turn; NaN where that is zero
 
     def faults(self, airspeed: float) -> list[str]:
-        """What forbids to call it a change of course."""
+        """Why it does not count as a change of course; empty if it does."""
         return [
             *(
                 [f"course {math.degrees(self.error):.1f} deg off, at most 1.5"]
@@ -106,7 +106,7 @@ class Circled:
     sideslip: float  # largest
 
     def faults(self, airspeed: float) -> list[str]:
-        """What forbids to call it a circle."""
+        """Why it does not count as a circle; empty if it does."""
         return [
             *([f"{100 * self.error:.1f} % of the radius off, at most 2 %"] if not self.error < 0.02 else []),
             *_of_path(self.altitude, self.sideslip, airspeed),

@@ -76,7 +76,7 @@ def with_inner_loop(model: Original, inner_loop: str) -> str:
 
 
 def writers(root: Element) -> dict[str, str]:
-    """Of each property that the model writes, the component that does."""
+    """The component that writes each property of the model."""
     return {
         (output.text or "").strip().replace("[0]", ""): f"<{component.tag} name={component.get('name', '')!r}>"
         for component in root.iter()

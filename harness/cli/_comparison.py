@@ -1,4 +1,4 @@
-"""What `compare`, `report` and `show` share: which flights are wanted, where they come from, what judges them."""
+"""Shared by `compare`, `report` and `show`: the selection of flights, their origin, and the margins."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_comparison(
 
 
 def reduced(comparison: Comparison, folders: tuple[Path, ...]) -> list[Reduced]:
-    """What a cheaper plant saves as a control variate: see `reductions`. BadInput where no flight can serve as one."""
+    """The saving by a cheaper plant as a control variate: see `reductions`. BadInput if no flight can serve as one."""
     from harness.verdict.control_variates import reductions
     from harness.verdict.pairs import CompareError
 

@@ -1,4 +1,4 @@
-"""What the user gave: the command line as typed, the settings file and its flight, and the error for what is wrong."""
+"""User input: the command line as typed, the settings file and its flight, and the error for invalid input."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class BadInput(click.ClickException):
-    """What the user gave cannot be used: the message alone goes to stderr; exit code 2."""
+    """Invalid input: only the message goes to stderr; exit code 2."""
 
     exit_code = 2
 

@@ -15,7 +15,7 @@ CLOSED = 141  # the exit code of a program that SIGPIPE ends, as shells report i
 
 
 def guard() -> None:
-    """From now on a write that fails ends the command: quietly on a closed pipe, else as bad input with the reason.
+    """Makes a failing write end the command: silently on a closed pipe, otherwise as bad input with the reason.
 
     Names of files are written as the bytes that they are, and other characters outside the encoding as escapes.
     """
@@ -54,7 +54,7 @@ class _Stderr(io.FileIO):
 
 
 class _Stdout(io.FileIO):
-    """What fails here is no `OSError` of a file that a command handles."""
+    """Standard output whose failures are not mistaken for an `OSError` of a file that a command handles."""
 
     def write(self, content: Any) -> int:
         try:

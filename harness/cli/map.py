@@ -139,7 +139,7 @@ def map_(
 
 
 def _print_search(found: Map) -> None:
-    """What is mapped, how finely, and by how many flights at most."""
+    """Prints the question, the resolution, and the largest number of flights."""
     from harness.tables import counted
 
     border = found.panels[0].border

@@ -1,4 +1,4 @@
-"""What the doctor found of one thing."""
+"""A finding of the doctor."""
 
 from enum import StrEnum
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""What the harness needs of an installation: Python, packages in their versions, the viewer."""
+"""The requirements of an installation: Python, packages in their versions, the viewer."""
 
 import platform
 import subprocess
@@ -23,7 +23,7 @@ def installation() -> Iterator[Finding]:
     here = platform.python_version()
     serves = asked.contains(here, prereleases=True)
     yield Finding(
-        "python", here if serves else f"{here}, needed is {asked}", Soundness.OK if serves else Soundness.MISSING
+        "python", here if serves else f"{here}, required is {asked}", Soundness.OK if serves else Soundness.MISSING
     )
     yield Finding(DISTRIBUTION, version(DISTRIBUTION), Soundness.OK)
     modules = _modules()
@@ -37,9 +37,9 @@ def _package(requirement: Requirement, modules: dict[str, list[str]]) -> Finding
     try:
         there = version(name)
     except PackageNotFoundError:
-        return Finding(name, f"not installed, needed is {asked}", Soundness.MISSING)
+        return Finding(name, f"not installed, required is {asked}", Soundness.MISSING)
     if not asked.contains(there, prereleases=True):
-        return Finding(name, f"{there}, needed is {asked}", Soundness.MISSING)
+        return Finding(name, f"{there}, required is {asked}", Soundness.MISSING)
     try:
         for module in modules.get(_plain(name), ()):
             import_module(module)

@@ -68,7 +68,7 @@ def examined(flight: Flight) -> Iterator[Found]:
 
 
 class _Wrong(Exception):  # noqa: N818 - no fault of the program
-    """The law answers wrongly; the message says how."""
+    """The law returns a wrong answer; the message describes it."""
 
 
 def _finite(flight: Flight) -> str:
@@ -85,7 +85,7 @@ def _finite(flight: Flight) -> str:
 
 def _limited(flight: Flight) -> str:
     if flight.law.command == "course_rate":
-        return "not asked: it limits its course rate"
+        return "not checked: it limits its course rate"
     most = max(abs(a.heading_rate) for a in answers(flight, flight.law, [*observations(flight, _SEEN)]))
     if most > flight.law.max_heading_rate * (1.0 + _SAME):
         raise _Wrong(f"it commands {most:.4g} rad/s, its max_heading_rate is {flight.law.max_heading_rate:.4g} rad/s")
@@ -107,13 +107,13 @@ def _without_traces(flight: Flight) -> str:
         together.append(one(mine))
         other(theirs)
     _compare(seen, alone, together, "beside another flight it answers")
-    return "two flights at once do not know of each other"
+    return "two simultaneous flights are independent"
 
 
 def _mirrored(flight: Flight) -> str:
     law: Any = flight.law
     if not hasattr(law, "direction"):
-        return "not asked: it has no setting `direction`, and circles one way"
+        return "not checked: it has no setting `direction`, and circles in one sense"
     seen = observations(flight, _FEW)
     there: Law = replace(law, direction="mirrored")
     step = mirrored(started(there, context_of(flight)))
@@ -135,10 +135,10 @@ def _memory(flight: Flight) -> str:
     airspeed = flight.start.airspeed
     response = identified(_folder(flight), airspeed).heading_rate
     if not has_memory(Loop(flight.law, response, airspeed, flight.guidance_period)):
-        return "none: `harness predict` asks it at any point"
+        return "none: `harness predict` evaluates it at any point"
     if hasattr(flight.law, "linearised"):
-        return "it has, and gives its linearisation to `harness predict`"
-    return "it has, and no method `linearised`: `harness predict` knows no margin of it"
+        return "it has, with a linearisation for `harness predict`"
+    return "it has, without a method `linearised`: `harness predict` gives no margin"
 
 
 def _folder(flight: Flight) -> Path:

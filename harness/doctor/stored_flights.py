@@ -62,7 +62,7 @@ def moved(then: StoredFlight, now: StoredFlight) -> Deviation | None:
 
 
 def stored() -> tuple[Mapping[str, str], dict[str, StoredFlight]]:
-    """What decided the bits of the stored flights beside the code, see `decides_bits`; and the flights by name."""
+    """The environment that decided the bits of the stored flights, see `decides_bits`; and the flights by name."""
     content = json.loads(STORED.read_text(encoding="utf-8"))
     return content["bits"], {name: StoredFlight(**flight) for name, flight in content["flights"].items()}
 

@@ -1,1 +1,1 @@
-"""What the airframes do with a heading-rate command: flown, fitted, drawn, and kept beside them."""
+"""Identification of the response to a heading-rate command: flown, fitted, drawn, and stored with the airframe."""

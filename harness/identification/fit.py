@@ -85,7 +85,7 @@ def pulse_response(response: Response, count: int) -> Array:
     system = np.zeros((n + 2, n + 2))
     system[:n, :n], system[:n, -1], system[n, :n] = A, b, c
     steps = int(response.delay // STEP)  # whole ones in the delay
-    late = response.delay - steps * STEP  # the pulse begins that late in a step, and ends as late in the next
+    late = response.delay - steps * STEP  # s: offset of the pulse's edges in a step
     before, after = expm(system * late), expm(system * (STEP - late))
     step = (after @ before)[: n + 1, : n + 1]
     begun, ended = after[: n + 1, -1], after[: n + 1, : n + 1] @ before[: n + 1, -1]

@@ -76,7 +76,7 @@ class FrequencyResponse:
 
     @property
     def sweep(self) -> Sweep:
-        """The same as numbers to keep."""
+        """The result as numbers to store."""
         phase = np.unwrap(np.angle(self.ratio))
         return Sweep._make(tuple(values.tolist()) for values in (manoeuvres.lines(), np.abs(self.ratio), phase))
 
@@ -168,12 +168,12 @@ def _slower(airframe: Path) -> int:
 
 
 def _lag(airframe: Path) -> float:
-    """About how late the aircraft follows, s."""
+    """Approximate lag of the aircraft, s."""
     return aircraft.adopted_lag(airframe) or _SMALL_LAG  # of the harness's own: the committed fits were made so
 
 
 def _scale(airframe: Path, airspeed: float) -> float:
-    """What the commands are multiplied with: an adopted aircraft's largest stays within its bank."""
+    """The scale of the commands, which keeps an adopted aircraft within its bank limit."""
     if not aircraft.adopted(airframe):
         return 1.0
     largest = 0.85 * float(rate_of_turn(np.array(airspeed), np.array(aircraft.limits(airframe).bank)))

@@ -74,7 +74,7 @@ CHATTER: Mapping[str, Array] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Programme:
-    """What is flown to identify an aircraft; the rate trim is off for the bank's training alone."""
+    """The manoeuvres of an identification; the rate trim is off only for the fit of the bank."""
 
     swept: Mapping[str, float]  # deg/s rms, of sweeps of two periods each; the smallest first
     steps: Sequence[Array]

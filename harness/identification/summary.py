@@ -14,7 +14,7 @@ _POINTS_RAD_S = (0.3, 1.0, 3.0, 10.0)
 
 
 def summary_lines(identification: Identification) -> Iterator[str]:
-    """What was flown, what was fitted, and how well the fit follows the flights."""
+    """The manoeuvres, the fit, and its errors."""
     fitted = identification.identified
     yield f"{identification.airframe.name} at {fitted.airspeed:g} m/s"
     yield ""

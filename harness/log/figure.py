@@ -47,9 +47,9 @@ def picture(flights: Flights, panels: Sequence[str] = ()) -> Picture:
 
 
 def panels_of(flights: Flights, panels: Sequence[str] = ()) -> list[str]:
-    """The panels that can be drawn of those asked for. Errors as `picture`."""
+    """The requested panels that can be drawn. Errors as `picture`."""
     if not 1 <= len(flights) <= MOST:
-        raise ArgumentError(f"{len(flights)} flights: up to {MOST} can be told apart")
+        raise ArgumentError(f"{len(flights)} flights: must be at most {MOST}")
     for name, log in flights.items():
         if not len(log):
             raise ArgumentError(f"{name}: nothing to draw: {log.reason}")
@@ -159,7 +159,7 @@ def sideslip(axes: Axes, flights: Flights) -> None:
 
 
 def spectrum(axes: Axes, flights: Flights) -> None:
-    """How strongly the law's command swings at each frequency while circling is judged; a dot marks a limit cycle."""
+    """The amplitude spectrum of the law's command in the judged window; a dot marks a limit cycle."""
     highest = 0.0
     for log, style in _styled(flights):
         signals = Signals(log)
@@ -216,7 +216,7 @@ def named(logs: Sequence[FlightLog]) -> Flights:
 
 
 def _columns(panels: Sequence[str]) -> tuple[list[str], list[str]]:
-    """What stands on the left, and what on the right: over time."""
+    """The panels on the left, and those on the right: over time."""
     left, right = ([name for name in panels if PANELS[name].over_time is side] for side in (False, True))
     return left, right
 

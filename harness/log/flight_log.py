@@ -124,7 +124,7 @@ class FlightLog:
             content.update(np.ascontiguousarray(rows + 0.0).data)  # + 0.0: minus zero is zero
         return content.hexdigest()[:32]
 
-    # What a notebook asks of a log. Each loads what it needs when it is asked: a flight alone needs neither.
+    # For notebooks. Each imports its module when it is used: a flight alone needs neither.
 
     @property
     def metrics(self) -> dict[str, float | bool | None]:

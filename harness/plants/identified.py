@@ -63,10 +63,10 @@ class Identified:
 
     @property
     def coordinated(self) -> Coordinated:
-        """Raises `PlantError` where nothing is known of the bank."""
+        """Raises `PlantError` if the response of the bank is unknown."""
         if self.bank is None:
             raise PlantError(
-                "plant", "coordinated needs the response of the bank, and the log tells it not: lagged does"
+                "plant", "coordinated requires the response of the bank, which the log does not give: use lagged"
             )
         return Coordinated(self.bank, self.hold, self.bank_limit)
 

@@ -1,4 +1,4 @@
-"""A plant whose commands arrive late."""
+"""A plant with a transport delay of its command."""
 
 from collections import deque
 
@@ -7,14 +7,14 @@ from harness.plants.state import State
 
 
 class Late:
-    """A plant in flight behind a delay of `whole` guidance periods and `part` seconds, less than a period.
+    """A plant in flight with a transport delay of `whole` guidance periods and `part` seconds, less than a period.
 
-    Until the first command arrives the plant has zero: straight flight.
+    Until the first command arrives the effective command is zero: straight flight.
     """
 
     def __init__(self, flying: Flying, whole: int, part: float) -> None:
         self._flying, self._part = flying, part
-        self._on_the_way = deque([0.0] * (whole + 1))  # the oldest is the one that the plant has
+        self._on_the_way = deque([0.0] * (whole + 1))  # the oldest is the effective command
 
     @property
     def state(self) -> State:

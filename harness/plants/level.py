@@ -29,7 +29,7 @@ class Motion(NamedTuple):
 
 _moved, _state = Motion._make, State._make  # from a tuple, in half the time of the constructor
 Move = Callable[[Motion, float, float], Motion]
-"""From the aircraft, its heading-rate command, rad/s, and for how long, s, to the aircraft then, in still air."""
+"""Advances the aircraft with a heading-rate command, rad/s, over a time, s, in still air."""
 States = tuple[float, ...]
 
 

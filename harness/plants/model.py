@@ -89,7 +89,7 @@ def _properties(model: ElementTree.Element) -> list[str]:
 def load(airframe: Path, step: float, errors: Errors = _NO_ERRORS) -> Fdm:
     """A new JSBSim with this airframe and its inner loop, stepping by `step` seconds. Raises `ModelError`.
 
-    Errors of the aircraft are in a copy of its model: JSBSim lets nobody set mass or lags of a loaded one.
+    Errors of the aircraft are in a copy of its model: JSBSim cannot set mass or lags of a loaded one.
     """
     airframe = airframe.absolute()  # JSBSim takes a relative folder to be one of its own
     is_foreign = aircraft.adopted(airframe) is not None

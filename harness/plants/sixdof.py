@@ -329,7 +329,7 @@ class SixDofFlying:
         return state_of([get() for get in self.readers], before, self.frame)
 
     def judge(self, state: State, period: float) -> None:
-        """Of an aircraft that is not flying, or that is nowhere. Raises `End`, of a stall when it has lasted."""
+        """Raises `End` for an aircraft on the ground, departed or with a non-finite state, or in a lasting stall."""
         if not all(map(math.isfinite, state)):
             raise End(Outcome.INVALID, "a number of the simulated aircraft is not finite")
         if state.altitude <= GROUND:

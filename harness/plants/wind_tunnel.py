@@ -1,8 +1,8 @@
-"""A wind tunnel for a model that nobody here wrote: the aircraft is held in the air, while engines and surfaces settle.
+"""A wind tunnel for third-party models: the aircraft is held in the air while engines and surfaces settle.
 
-The trim of the harness's own airframes asks for the accelerations of one instant, with the surfaces placed. A foreign
-model has a flight control system, propellers and turbines of its own, so its accelerations count after a while only.
-JSBSim's integrators are switched off meanwhile: time goes on, and the aircraft stays where it is.
+The trim of the harness's own airframes uses the accelerations of one instant, with the surfaces placed. A third-party
+model has its own flight control system, propellers and turbines, so its accelerations are valid only after they settle.
+JSBSim's integrators are switched off meanwhile: time advances, and the motion of the aircraft is frozen.
 """
 
 import math
@@ -48,7 +48,7 @@ class Controls:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Self:
-        """From a table of a file: names, and for `throttle` one or a list of them."""
+        """The controls from a table of a file: names, and for `throttle` one or a list of them."""
         throttles = table["throttle"]
         names = (throttles,) if isinstance(throttles, str) else tuple(throttles)
         return cls(table["elevator"], table["aileron"], table["rudder"], names)
@@ -134,7 +134,7 @@ class WindTunnel:
 
     @property
     def thrust(self) -> float:
-        """Of all engines together, forwards, N."""
+        """Forward thrust of all engines, N."""
         return POUND * self.fdm["forces/fbx-prop-lbs"]
 
     def settled(self, least: float = 0.2, longest: float = 30.0, tolerance: float = 3e-5) -> Array:
@@ -155,9 +155,9 @@ class WindTunnel:
         return self.settled()
 
     def approached(self) -> Array:
-        """The accelerations in the setting, its surfaces come to from the same side, whatever they did before.
+        """The accelerations in the setting, with the surfaces approached from one side.
 
-        So play in the controls does not make the accelerations depend on the past.
+        So hysteresis in the controls gives one answer.
         """
         with self.changed(elevator=_ASIDE, aileron=_ASIDE, rudder=_ASIDE):
             self.command()

@@ -1,1 +1,1 @@
-"""Flights that somebody recorded: read from their logs, judged, and held beside the simulated aircraft."""
+"""Recorded flights: read from their logs, judged, and compared with the simulated aircraft."""

@@ -1,8 +1,8 @@
-"""What a recorded flight says of the coordinated-flight assumption, part by part, and what it cannot say.
+"""The coordinated-flight assumption judged on a recorded flight, part by part, with reasons for what cannot be judged.
 
-Words, margins and intervals are those of the verdict. There a seed is one draw; here it is a window of flight, or what
-is left when one window is left out (the jackknife), so that wind, airspeed scale and turn relation have intervals that
-know of each other. A part that the log cannot answer is refused with its reason, never with a number.
+Terms, margins and intervals are those of the verdict. There a seed is one draw; here it is a window of flight, or the
+flight without one window (the jackknife), so that the intervals of wind, airspeed scale and turn relation include each
+other's uncertainty. A part that cannot be judged is refused with its reason, never with a number.
 """
 
 import math
@@ -29,13 +29,13 @@ from harness.vocabulary import Verdict
 
 Array = NDArray[np.float64]
 
-FLYING = 6.0  # m/s, over the ground or through the air: an aircraft at that speed flies
-SHORTEST = 10.0  # s of flight
-WINDOW = 10.0  # s
-MOST_ALIKE = 0.4  # correlation of a window with the next: windows more alike than that are joined
-LEAST_LEAN = math.radians(2.0)  # rms of the bank about its mean, by which a lateral force is told from a zero offset
+FLYING = 6.0  # m/s: ground speed or airspeed from which an aircraft counts as flying
+SHORTEST = 10.0  # s: shortest flight that is judged
+WINDOW = 10.0  # s: shortest window
+MOST_ALIKE = 0.4  # largest correlation of neighbouring windows; windows with more are joined
+LEAST_LEAN = math.radians(2.0)  # least rms of the bank about its mean, to separate a lateral force from a sensor offset
 
-_CIRCULAR = "no vane: an angle made of an estimated wind is circular, since that takes sideslip for zero"
+_CIRCULAR = "no vane: an angle derived from an estimated wind is circular, since the filter assumes zero sideslip"
 
 LATERAL = Part(
     "lateral force", "lateral_force", "of g sin(bank)", "turn_ratio", "within", Group.COORDINATED, assumed=0.0
@@ -44,17 +44,17 @@ LATERAL = Part(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
-    """All that is said of a recorded flight."""
+    """The assessment of a recorded flight."""
 
-    flight: RecordedFlight  # the part that was assessed, with signs turned the right way round
+    flight: RecordedFlight  # the assessed part, with corrected signs
     begin: float  # s
     end: float
     findings: tuple[PartFinding, ...]
     wind: SteadyWind | None
     estimated: Estimated | None  # the autopilot's wind
     points: tuple[TurnPoint, ...]
-    age: float  # s, of the track beyond the bank's; NaN where it is not known
-    bank: ResponseFit | None  # behind its command
+    age: float  # s: latency of the track minus that of the bank; NaN if unknown
+    bank: ResponseFit | None  # response to its command
     heading_rate: ResponseFit | None
     notes: tuple[str, ...]  # conventions and scales that were found, a sentence each
 
@@ -66,7 +66,7 @@ class Assessment:
 def assess(
     flight: RecordedFlight, begin: float = -math.inf, end: float = math.inf, margins: Assess | None = None
 ) -> Assessment:
-    """What the flight says between these times, s. See `Assessment`."""
+    """The assessment of the flight between these times, s."""
     limits = margins_of(margins or Assess())
     try:
         begin, end = _flown(flight, begin, end)
@@ -144,7 +144,7 @@ def _flown(flight: RecordedFlight, begin: float, end: float) -> tuple[float, flo
 
 
 def _speed(flight: RecordedFlight) -> tuple[Array, Array]:
-    """How fast the aircraft moves, over the ground or through the air, whichever is more; at one time a second."""
+    """Ground speed or airspeed, whichever is larger, m/s, once a second."""
     if not len(flight.channels):
         raise CannotJudgeError("the log holds nothing in this time")
     time = np.arange(flight.begin, flight.end, 0.5)
@@ -171,7 +171,7 @@ class _Made:
     sample: Sample
     reason: str = ""
     barred: str = ""  # why nothing may be decided by it
-    unless_it_holds: str = ""  # why it cannot be judged from what it deviates by; that it holds may still be said
+    unless_it_holds: str = ""  # why a violation cannot be judged, although it may be shown to hold
 
 
 def _turn_relation(turning: "Turning | CannotJudgeError") -> _Made:
@@ -190,7 +190,7 @@ def _level(flight: RecordedFlight) -> _Made:
         off = channel.values - (flight["altitude_command"].at(channel.time) if commanded else np.median(channel.values))
         about = "from the commanded altitude" if commanded else "from the flight's median: the log has no command"
         if not commanded:
-            asked = "the altitude changes, and the log has no command: a climb that was asked for is no deviation"
+            asked = "the altitude changes, and the log has no command: a commanded climb is no deviation"
             return _Made(_windowed(channel.time, np.abs(off), np.max), about, unless_it_holds=asked)
     else:
         raise CannotJudgeError("the log has no altitude")
@@ -218,7 +218,7 @@ def _sideslip(flight: RecordedFlight) -> _Made:
 
 
 def _lateral(flight: RecordedFlight) -> _Made:
-    """The slope of the lateral specific force on g sin(bank): the turn relation less one, from another sensor."""
+    """The slope of the lateral specific force over g sin(bank): the turn relation minus one, from another sensor."""
     if not flight.has("lateral_acceleration", "bank"):
         raise CannotJudgeError("the log has no lateral specific force" if "bank" in flight else "the log has no bank")
     time, force = averaged(flight["lateral_acceleration"], 1.0)
@@ -226,7 +226,7 @@ def _lateral(flight: RecordedFlight) -> _Made:
     known = np.isfinite(bank) & np.isfinite(force) & (np.abs(bank) <= turn.STEEPEST)
     time, force, lean = time[known], force[known], GRAVITY * np.sin(bank[known])
     if len(time) < 4 or np.std(lean) < GRAVITY * LEAST_LEAN:
-        raise CannotJudgeError("the bank hardly changes, so that a force is not told from the sensor's zero")
+        raise CannotJudgeError("not excited: the bank hardly changes, so the force cannot be separated from an offset")
     count = int((time[-1] - time[0]) / WINDOW)
     if count < LEAST_SEEDS:
         raise CannotJudgeError(f"{count} windows of {WINDOW:g} s; {LEAST_SEEDS} are needed")
@@ -278,7 +278,7 @@ def _worded(made: "dict[str, _Made | CannotJudgeError]", limits: dict[str, float
 
 
 def _bounds(part: Part, limits: dict[str, float]) -> Bounds:
-    """Of the value itself."""
+    """The margin of the value itself."""
     low, high = part.bounds(limits)
     assumed = part.assumed or 0.0
     return (None if low is None else assumed + low), (None if high is None else assumed + high)
@@ -288,7 +288,7 @@ def _bounds(part: Part, limits: dict[str, float]) -> Bounds:
 
 
 def _windowed(time: Array, values: Array, of: Callable[[Array], float]) -> Sample:
-    """A number for each window of flight; windows are as long as makes neighbours differ. Raises `CannotJudgeError`."""
+    """A number for each window; windows are long enough to be independent. Raises `CannotJudgeError`."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     length = WINDOW
@@ -306,7 +306,7 @@ def _windowed(time: Array, values: Array, of: Callable[[Array], float]) -> Sampl
 
 
 def averaged(channel: Channel, over: float) -> tuple[Array, Array]:
-    """Means over so many seconds each, with their middles: noise of single values is no deviation."""
+    """Means over so many seconds each, with their middle times, to remove the noise of single values."""
     if channel.interval >= over:
         return channel.time, channel.values
     place = ((channel.time - channel.time[0]) / over).astype(int)

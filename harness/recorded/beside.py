@@ -1,4 +1,4 @@
-"""The model beside a recorded flight: the 6-DOF aircraft banks as was recorded, and the same parts are judged."""
+"""A 6-DOF flight with the bank, airspeed and wind of a recorded flight, judged in the same way."""
 
 import math
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ _ASSUMED = (
 
 @dataclass(frozen=True, slots=True)
 class ModelFlight:
-    """What the model did."""
+    """The flight of the model."""
 
     airframe: str
     airspeed: float  # m/s
@@ -44,14 +44,14 @@ class ModelFlight:
 def beside(found: Assessment, airframe: Path) -> ModelFlight:
     """Flies the airframe with the recorded bank, at the recorded airspeed and in the wind of the track.
 
-    The command is the heading rate of a coordinated turn at that bank. Raises `LogError` where the log does not tell
+    The command is the heading rate of a coordinated turn at that bank. Raises `LogError` if the log does not give
     bank, airspeed and wind, or the model does not fly so slowly or fast.
     """
     if aircraft.is_recorded(airframe):
         raise LogError(f"no model beside this log: {airframe.name} was fitted to a flight, and has none")
     flight, limits = found.flight, aircraft.limits(airframe)
     if not found.wind or not flight.has("bank"):
-        raise LogError("no model beside this log: it does not tell bank and wind")
+        raise LogError("no model beside this log: it gives no bank and wind")
     airspeed = _airspeed(found)
     if not limits.slowest <= airspeed <= limits.fastest:
         allowed = f"{airframe.name} flies from {limits.slowest:g} to {limits.fastest:g} m/s"

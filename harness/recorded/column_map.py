@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from harness.error import did_you_mean
 from harness.files import read
+from harness.plants.turn import GRAVITY
 from harness.recorded.frames import AXES, BODY, EARTH
 from harness.recorded.recorded_flight import QUANTITIES, Basis, LogError
 from harness.toml_text import shown
@@ -24,7 +25,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "m/s": {"m/s": 1.0, "cm/s": 0.01, "km/h": 1.0 / 3.6, "kn": _KNOT, "ft/s": _FOOT},
         "rad": {"rad": 1.0, "deg": _DEGREE, "cdeg": 0.01 * _DEGREE},
         "rad/s": {"rad/s": 1.0, "deg/s": _DEGREE},
-        "m/s2": {"m/s2": 1.0, "g": 9.80665},
+        "m/s2": {"m/s2": 1.0, "g": GRAVITY},
         "": {"1": 1.0, "%": 0.01},
     }
 )
@@ -125,7 +126,7 @@ def read_map(name: str) -> ColumnMap:
 
 
 class _MapError(ValueError):
-    """What is wrong in a map, with its key."""
+    """A mistake in a map, with its key."""
 
 
 def _parsed(name: str, document: Mapping[str, Any]) -> ColumnMap:

@@ -1,4 +1,4 @@
-"""What a recorded flight holds, as lines: channels, their units, where they come from, and how often they change."""
+"""The content of a recorded flight, as lines: channels, their units, their origin, and their update rates."""
 
 import math
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ HEADINGS = ("channel", "new values\n/s", "rows\n/s", "longest gap\ns", "least", 
 
 
 def contents(flight: RecordedFlight) -> Iterator[str]:
-    """The lines that tell what was read."""
+    """The lines that report what was read."""
     files = flight.sources[0] if len(flight.sources) == 1 else f"{len(flight.sources)} files"
     yield f"{flight.name}: {duration(flight):.1f} s of flight log, from {files}"
     if flight.vehicle:
@@ -39,12 +39,12 @@ def rows(flight: RecordedFlight) -> Iterator[list[str]]:
 
 
 def duration(flight: RecordedFlight) -> float:
-    """From the first to the last sample, s."""
+    """Time from the first to the last sample, s."""
     return flight.end - flight.begin
 
 
 def as_json(flight: RecordedFlight) -> dict[str, Any]:
-    """The same for a program; SI, rad."""
+    """The content for JSON; SI, rad."""
     return {
         "name": flight.name,
         "sources": list(flight.sources),

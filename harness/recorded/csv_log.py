@@ -24,14 +24,14 @@ def read_csv(paths: Sequence[Path], map_name: str | None) -> RecordedFlight:
     parts = {path: part for path in paths if (part := chosen.file(path.name))}
     if not parts:
         patterns = ", ".join(part.pattern for part in chosen.files)
-        raise LogError(f"{paths[0]}: the map {chosen.name} knows no file of this name, only {patterns}")
+        raise LogError(f"{paths[0]}: the map {chosen.name} has no entry for this file name, only for {patterns}")
     name = paths[0].name if len(paths) == 1 else paths[0].parent.name or str(paths[0].parent)
     clocks = dict.fromkeys(part.clock.counts for part in parts.values() if part.clock.counts)
     draft = Draft(name, [str(path) for path in parts], "; ".join(clocks) or "the files' own clock")
     draft.of_receipt = any(part.clock.of_receipt for part in parts.values())
     unused = [path.name for path in paths if path not in parts]
     if unused:
-        draft.problems.append(f"the map {chosen.name} says nothing of {', '.join(unused)}: not read")
+        draft.problems.append(f"the map {chosen.name} has no entry for {', '.join(unused)}: not read")
     for path, part in parts.items():
         _read_file(draft, path, part, headers[path], chosen)
     return draft.finished()
@@ -84,7 +84,7 @@ def _read_file(draft: Draft, path: Path, part: FileMap, header: Sequence[str], c
     missing = [column for column in part.columns if column not in header]
     if missing:
         raise LogError(
-            f"{path}:1: has no column {missing[0]!r}, which the map {chosen.name} asks for; "
+            f"{path}:1: has no column {missing[0]!r}, which the map {chosen.name} requires; "
             f"its columns are {', '.join(header)[:300]}"
         )
     lines = _lines(path) - 1

@@ -35,7 +35,7 @@ _DEGREES = ("d", "h", "D", "U", "k")  # units of FMTU that are degrees, or degre
 
 
 class Message(NamedTuple):
-    """What one kind of message gives: channels, each a field with its unit in logs that do not tell it."""
+    """The channels of one kind of message, each a field with its unit in logs that do not contain units."""
 
     name: str
     basis: Basis
@@ -124,7 +124,7 @@ _MODES: Mapping[int, str] = MappingProxyType(
 
 
 class Layout(NamedTuple):
-    """What FMT says of a message."""
+    """The format of a message from FMT."""
 
     name: str
     length: int  # bytes, with the three before it
@@ -303,7 +303,7 @@ def _table(content: mmap.mmap, offsets: "array[int]", layout: Layout) -> NDArray
 def _units(
     tables: Mapping[str, NDArray[np.void]], layouts: Mapping[int, Layout]
 ) -> tuple[dict[str, str], dict[str, dict[int, float]]]:
-    """Of each message the letters of its units, and the factor of each field, where the log tells them."""
+    """The letters of the units and the factor of each field of each message, if the log contains them."""
     units: dict[str, str] = {}
     factors: dict[str, dict[int, float]] = {}
     scale = {}

@@ -21,7 +21,7 @@ FASTEST = 100.0  # 1/s: rows that come faster are averaged, so that a long log t
 LARGEST, LARGEST_TIME = 1e9, 1e11  # SI: a larger number is none
 WILD = 0.01  # of the rows: so few with a time far off are damaged; of more, the clock was set back
 LONGEST = 86_400.0  # s from the middle of a log: what is further away is damaged
-DISORDER = 1.0  # s: rows that come so much too late are put in order; beyond it the clock was set back
+DISORDER = 1.0  # s: rows out of order by up to this are sorted; beyond it the clock was set back
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Draft:
             self.refusals.append(f"{source}: the clock goes back {at}: two recordings, or a restart, in one log")
             rows, t, late = rows[:k], t[:k], late[:k]
         if disordered := int(np.count_nonzero(late > 0.0)):
-            how = f"come up to {late.max():.3g} s too late, and are put in order"
+            how = f"are out of order by up to {late.max():.3g} s, and are sorted"
             self.problems.append(f"{source}: {disordered} of {len(time)} rows {how}")
             rows = rows[np.argsort(t, kind="stable")]
         repeated = np.diff(time[rows], prepend=-np.inf) == 0.0
@@ -99,7 +99,7 @@ class Draft:
         self._leave_out_what_is_far_off()
         if not self.channels:
             why = "; ".join([*self.refusals, *self.problems])
-            raise LogError(f"{self.name}: has nothing that a flight is judged by{f' ({why})' if why else ''}")
+            raise LogError(f"{self.name}: has no channel that can be judged{f' ({why})' if why else ''}")
         begin = min(float(channel.time[0]) for channel in self.channels.values())
         channels = {
             name: Channel(c.time - begin, c.values, c.basis, c.source, c.rows, c.note)

@@ -13,7 +13,7 @@ from harness.recorded.following import BANK, HEADING_RATE, SAMPLES_IN_LAG, Comma
 from harness.recorded.recorded_flight import Array, Basis, LogError
 from harness.recorded.response_fit import GAIN, ResponseFit
 
-SUREST = 0.4  # half of the lag's interval over the lag: a log that says less does not tell the response
+SUREST = 0.4  # largest half-width of the lag's interval over the lag, for which the response is identified
 HELD = AirspeedHold(gain=0.0, frequency=1.0, damping=1.0)  # constant airspeed: its change is not fitted
 # Where autopilots keep the largest bank that they command: the parameter, and its unit, rad.
 BANK_LIMITS = {
@@ -24,9 +24,9 @@ BANK_LIMITS = {
 
 
 def identified(found: Assessment) -> Identified:
-    """What the plants fly by. Raises `LogError` with the reason where the log does not tell.
+    """The identified response for the plants. Raises `LogError` with the reason if the log does not excite it enough.
 
-    The heading rate follows as it does its own command, or as the bank does, whichever lag is surer.
+    The heading rate has the response to its own command, or that of the bank, whichever lag has the narrower interval.
     """
     fits: dict[Commanded, ResponseFit] = {}
     refusals: list[str] = []
@@ -58,7 +58,7 @@ def identified(found: Assessment) -> Identified:
 
 
 def _unsure(fit: ResponseFit, of: Commanded) -> str:
-    """Why the fit does not tell the response; empty where it does."""
+    """Why the response is not identified; empty if it is."""
     if fit.interval * SAMPLES_IN_LAG > fit.lag:
         return (
             f"too few samples for the dynamics: the {of.flown} has {1.0 / fit.interval:.2g} new values a second, "
@@ -79,10 +79,10 @@ def _doubt(fit: ResponseFit) -> float:
 def document(found: Assessment) -> str:
     """The text of the file. Raises `LogError`."""
     one, speeds = identified(found), _airspeeds(found)
-    of_receipt = ["# The lag holds the age of the telemetry: the aircraft is quicker than this."]
+    of_receipt = ["# The lag includes the latency of the telemetry: it is an upper bound."]
     lines = [
         f"# Written by `harness assess --fit` from {found.flight.name}, {found.begin:.1f} to {found.end:.1f} s:",
-        "# what the plants lagged and coordinated fly by. SI, rad.",
+        "# the response for the plants lagged and coordinated. SI, rad.",
         *(of_receipt if found.flight.of_receipt else []),
         "",
         "[limits] # as flown",
@@ -106,7 +106,7 @@ def _airspeeds(found: Assessment) -> Array:
 
 
 def _bank_limit(found: Assessment) -> float:
-    """The largest bank that the autopilot commands: by its parameters, else the largest commanded, flown or asked."""
+    """The largest bank that the autopilot commands: by its parameters, else the largest commanded or flown."""
     for name, unit in BANK_LIMITS.items():
         if (value := found.flight.parameters.get(name, 0.0)) > 0.0:
             return value * unit

@@ -1,4 +1,4 @@
-"""Whether an aircraft follows what is commanded: its bank, or its heading rate, each with a gain and a lag."""
+"""How an aircraft follows its command of bank or heading rate: gain and lag of each."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,8 +13,8 @@ from harness.recorded.response_fit import ResponseFit
 from harness.verdict.parts import PARTS, Group, Part
 from harness.vocabulary import Verdict
 
-LEAST_EXPLAINED = 0.8  # of what is flown, by its command
-SAMPLES_IN_LAG = 3.0  # values of what is flown within the lag, or it cannot be told
+LEAST_EXPLAINED = 0.8  # least share of the flown variance explained by the command
+SAMPLES_IN_LAG = 3.0  # least number of flown samples within the lag for the lag to be identified
 
 _GAIN = PARTS["heading_rate_gain_slow"]
 _LAG = Part("", "", "s late", "turn_ratio", "at most", Group.FOLLOWED, assumed=0.0)
@@ -22,7 +22,7 @@ _LAG = Part("", "", "s late", "turn_ratio", "at most", Group.FOLLOWED, assumed=0
 
 @dataclass(frozen=True, slots=True)
 class Commanded:
-    """A quantity that is commanded, and the two parts that say how well it is followed."""
+    """A commanded quantity, and the two parts that judge how it is followed: gain and lag."""
 
     noun: str
     command: str  # its channel
@@ -56,11 +56,11 @@ Fitted = ResponseFit | CannotJudgeError
 
 
 class _UnexplainedError(CannotJudgeError):
-    """The command says next to nothing of what is flown."""
+    """The command explains too little of the flown signal."""
 
 
 def response_of(flight: RecordedFlight, followed: Commanded, notes: list[str]) -> tuple[Fitted, RecordedFlight]:
-    """The fitted response; the flight with its command the right way round."""
+    """The fitted response; the flight with its command, inverted if its sign requires it."""
     try:
         return _fitted(flight, followed), flight
     except _UnexplainedError as refusal:
@@ -71,7 +71,7 @@ def response_of(flight: RecordedFlight, followed: Commanded, notes: list[str]) -
             return refusal, flight
     except CannotJudgeError as refusal:
         return refusal, flight
-    notes.append(f"{followed.noun} command: the sign is the wrong way round beside the {followed.flown}'s; turned")
+    notes.append(f"{followed.noun} command: the sign is opposite to the {followed.flown}'s; inverted")
     return found, turned
 
 
@@ -96,7 +96,7 @@ def _fitted(flight: RecordedFlight, followed: Commanded) -> ResponseFit:
 
 
 def lag_of(fit: Fitted, followed: Commanded, of_receipt: bool) -> PartFinding:
-    """The lag: an upper bound where the telemetry's age is in it, or where samples are too few."""
+    """The lag: an upper bound if it includes telemetry latency, or if samples are too few."""
     part = followed.lag
     if isinstance(fit, CannotJudgeError):
         return PartFinding(part, CANNOT, str(fit))
@@ -104,11 +104,11 @@ def lag_of(fit: Fitted, followed: Commanded, of_receipt: bool) -> PartFinding:
     count = len(fit.pseudo)
     why = []
     if of_receipt:
-        why.append("the age of the telemetry is in it")
+        why.append("it includes the latency of the telemetry")
     if fit.interval * SAMPLES_IN_LAG > fit.lag:
         why.append(f"the {followed.flown} has {1.0 / fit.interval:.2g} new values a second")
     if why:
         return PartFinding(part, Verdict.UNDECIDED, f"at most: {', and '.join(why)}", high, 0.0, high, count)
     if low <= 0.0:
-        return PartFinding(part, Verdict.UNDECIDED, "the interval holds zero", fit.lag, low, high, count)
+        return PartFinding(part, Verdict.UNDECIDED, "the interval contains zero", fit.lag, low, high, count)
     return PartFinding(part, Verdict.FAILS, "", fit.lag, low, high, count)

@@ -1,4 +1,4 @@
-"""What is drawn of a recorded flight, on a page and in a recording alike: track, values over time, turn relation."""
+"""The panels of a recorded flight, on a page and in a recording alike: track, values over time, turn relation."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ class FlightPanel(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """The turn relation, deg/s: what each window asked and flew, the line through it, and what is allowed."""
+    """The turn relation, deg/s: required and flown rate of each window, the fit, and the margin."""
 
     asked: Array
     flown: Array
@@ -105,7 +105,7 @@ def judged(found: Assessment) -> tuple[float, float] | None:
 
 
 def turn_finding(found: Assessment) -> PartFinding | None:
-    """What is said of the turn relation."""
+    """The text on the turn relation."""
     return next((finding for finding in found.findings if finding.part.title == TURN), None)
 
 

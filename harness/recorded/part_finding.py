@@ -1,4 +1,4 @@
-"""What a log says of one part of the assumption."""
+"""The verdict of a log on one part of the assumption."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ CANNOT = "cannot be judged from this log"
 
 @dataclass(frozen=True, slots=True)
 class PartFinding:
-    """What the log says of one part."""
+    """The verdict on one part."""
 
     part: Part
     word: str  # of `Verdict`, or `CANNOT`

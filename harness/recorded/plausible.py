@@ -50,7 +50,7 @@ def _too_large(flight: RecordedFlight) -> Iterator[str]:
 
 
 def _against_rates(flight: RecordedFlight) -> Iterator[str]:
-    """An angle that changes some 57 times as much as its rate says, or as little."""
+    """Problems of angles that change about 57 times as much, or as little, as the integral of their rates."""
     for angle, rate in _PAIRS:
         if not flight.has(angle, rate):
             continue
@@ -62,18 +62,18 @@ def _against_rates(flight: RecordedFlight) -> Iterator[str]:
             continue
         if _BETWEEN[0] < ratio < _BETWEEN[1]:
             yield (
-                f"{flight[angle].source}: {angle} changes {ratio:.0f} times as much as {rate} says: "
+                f"{flight[angle].source}: {angle} changes {ratio:.0f} times as much as the integral of {rate}: "
                 f"{angle} looks like degrees, or {rate} was radians already"
             )
         elif _BETWEEN[0] < 1.0 / ratio < _BETWEEN[1]:
             yield (
-                f"{flight[rate].source}: {rate} is {1.0 / ratio:.0f} times what {angle} changes by: "
+                f"{flight[rate].source}: {rate} is {1.0 / ratio:.0f} times the derivative of {angle}: "
                 f"{rate} looks like degrees, or {angle} was radians already"
             )
 
 
 def _turned(angle: Channel, rate: Channel) -> tuple[Array, Array]:
-    """What the angle changes by in spans of `_SPAN`, and what the rate adds up to in them; rad."""
+    """The changes of the angle in spans of `_SPAN`, and the integrals of the rate over them; rad."""
     time = np.arange(max(angle.time[0], rate.time[0]), min(angle.time[-1], rate.time[-1]), _SPAN)
     total = np.append(0.0, np.cumsum(0.5 * np.diff(rate.time) * (rate.values[1:] + rate.values[:-1])))
     turned, told = np.diff(angle.at(time)), np.diff(np.interp(time, rate.time, total))
@@ -86,13 +86,13 @@ def _gravity(flight: RecordedFlight) -> Iterator[str]:
     if name in flight and len(flight[name]) > 3:
         usual, source = float(np.median(flight[name].values)), flight[name].source
         if 0.5 < abs(usual) < 2.0:
-            yield f"{source}: {name} is {usual:.2g} m/s2 as a rule: looks like g; give its unit in the map"
+            yield f"{source}: {name} is {usual:.2g} m/s2 (median): looks like g; give its unit in the map"
         elif usual > 5.0:
-            yield f"{source}: {name} is {usual:.3g} m/s2 as a rule: points up; it must be negative in level flight"
+            yield f"{source}: {name} is {usual:.3g} m/s2 (median): points up; it must be negative in level flight"
 
 
 def _without_echoes(flight: RecordedFlight) -> RecordedFlight:
-    """Without commands that are what is flown to the last digit: an autopilot in manual logs them so."""
+    """The flight without commands that repeat the flown values, as autopilots log them in manual mode."""
     channels, problems = dict(flight.channels), list(flight.problems)
     for name, channel in flight.channels.items():
         flown = flight.channels.get(name.removesuffix("_command")) if name.endswith("_command") else None
@@ -100,5 +100,5 @@ def _without_echoes(flight: RecordedFlight) -> RecordedFlight:
             same = np.isin(channel.values, flown.values).mean()
             if same > 0.95 and np.ptp(channel.values) > 0.0:
                 del channels[name]
-                problems.append(f"{channel.source}: {name} repeats what is flown: no command, and left out")
+                problems.append(f"{channel.source}: {name} repeats the flown values: it is no command, and left out")
     return replace(flight, channels=channels, problems=tuple(problems))

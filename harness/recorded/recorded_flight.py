@@ -14,8 +14,8 @@ from harness.error import HarnessError, did_you_mean
 
 Array = NDArray[np.float64]
 
-# Between two samples further apart than so many usual intervals nothing is known. A value that stays the same is a
-# sample once in HELD usual intervals, so that what does not change is no gap.
+# Two samples further apart than this many usual intervals have a gap between them. A value that stays the same is a
+# sample once in HELD usual intervals, so that a constant signal has no gap.
 GAP = 8.0
 HELD = 3.0
 LARGEST = 1e9  # as of any setting: a larger number is a damaged one
@@ -35,7 +35,7 @@ class Basis(StrEnum):
 
 
 class Quantity(NamedTuple):
-    """What a channel holds."""
+    """The quantity of a channel."""
 
     unit: str  # SI, or rad
     meaning: str
@@ -60,8 +60,8 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "wind_down": Quantity("m/s", "velocity of the air"),
         "bank": Quantity("rad", "right wing down is positive"),
         "pitch": Quantity("rad", "nose up is positive"),
-        "yaw": Quantity("rad", "direction of the nose, clockwise from north, counted on beyond a turn"),
-        "course": Quantity("rad", "direction of the ground velocity, clockwise from north, counted on beyond a turn"),
+        "yaw": Quantity("rad", "direction of the nose, clockwise from north, unwrapped"),
+        "course": Quantity("rad", "direction of the ground velocity, clockwise from north, unwrapped"),
         "roll_rate": Quantity("rad/s", "about the body's x axis"),
         "pitch_rate": Quantity("rad/s", "about the body's y axis"),
         "yaw_rate": Quantity("rad/s", "about the body's z axis"),
@@ -87,7 +87,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "altitude_error": Quantity("m", "altitude minus commanded altitude"),
     }
 )
-DIRECTIONS = ("yaw", "course", "yaw_command", "course_command")  # angles that go on beyond a whole turn
+DIRECTIONS = ("yaw", "course", "yaw_command", "course_command")  # unwrapped angles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +186,7 @@ class LoggedEvent(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RecordedFlight:
-    """What a log tells of a flight. `flight["bank"]` is a channel; names as in `QUANTITIES`. SI, rad, NED."""
+    """The content of a log. `flight["bank"]` is a channel; names as in `QUANTITIES`. SI, rad, NED."""
 
     name: str
     sources: tuple[str, ...]  # files
@@ -194,9 +194,9 @@ class RecordedFlight:
     channels: Mapping[str, Channel]
     problems: tuple[str, ...] = ()  # what is wrong with the log, a line each
     events: tuple[LoggedEvent, ...] = ()  # modes and the like
-    failure: LoggedEvent | None = None  # from then on the aircraft is not the one that is asked for
+    failure: LoggedEvent | None = None  # from then on the aircraft has failed
     parameters: Mapping[str, float] = field(default_factory=dict)  # settings of the autopilot, where the log has them
-    of_receipt: bool = False  # the times are when a message was received: they hold the age of the telemetry
+    of_receipt: bool = False  # the times are those of receipt: they include telemetry latency
     refusals: tuple[str, ...] = ()  # why nothing may be judged from this log, a line each
     vehicle: str = ""  # what the log says of the autopilot
 

@@ -52,7 +52,7 @@ def _plot(i: int, panel: drawn.FlightPanel) -> Plot:
 
 
 def _stepped(time: Array, values: Array) -> tuple[Array, Array]:
-    """The same with each value held until just before the next."""
+    """The samples with each value held until just before the next."""
     before = np.maximum(time[1:] - 1e-3, time[:-1])
     return np.append(np.column_stack([time[:-1], before]), time[-1]), np.append(
         np.column_stack([values[:-1], values[:-1]]), values[-1]
@@ -98,7 +98,7 @@ def _marks(shown: drawn.Scatter, size: float) -> Iterator[Array]:
 
 
 def _notes(whole: RecordedFlight, found: Assessment, command: str) -> str:
-    """What was said and what was refused, in Markdown."""
+    """The verdict and the refusals, in Markdown."""
     judged = [row(finding) for finding in found.findings if finding.word != CANNOT]
     refused = [finding for finding in found.findings if finding.word == CANNOT]
     span = drawn.judged(found)

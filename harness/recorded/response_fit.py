@@ -60,7 +60,7 @@ class ResponseFit:
         return plain(max(0.0, self.delay), self.frequency, self.damping)
 
     def lag_interval(self) -> tuple[float, float]:
-        """Of the lag, with what is not known of when the command changed."""
+        """The interval of the lag, including the uncertainty of the time at which the command changed."""
         low, high = self.sample(LAG).interval() or (-math.inf, math.inf)
         return low - self.held, high + self.held
 

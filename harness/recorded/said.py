@@ -15,7 +15,7 @@ HEADINGS = ("part", "it", "value", "95 % interval", "unit", "windows", "")
 
 
 def lines(found: Assessment) -> Iterator[str]:
-    """What the flight says of the assumption, and what it does not say."""
+    """The verdict on each part of the assumption, and what cannot be judged."""
     judged = [finding for finding in found.findings if finding.word != CANNOT]
     refused = [finding for finding in found.findings if finding.word == CANNOT]
     parts: dict[str, list[str]] = {}  # by the reason why they cannot be judged
@@ -63,7 +63,7 @@ def wind_line(found: Assessment) -> Iterator[str]:
 
 def beside_lines(found: Assessment, model: ModelFlight) -> Iterator[str]:
     """The recorded flight and the model, part by part."""
-    yield f"Beside the model {model.airframe}, which banks as was recorded, at {model.airspeed:.1f} m/s in this wind:"
+    yield f"Beside the model {model.airframe}, with the recorded bank, at {model.airspeed:.1f} m/s in this wind:"
     yield ""
     yield from table(["part", "recorded", model.airframe, "unit"], beside_rows(found, model), "lrrl")
     if model.ended:
@@ -79,7 +79,7 @@ def beside_rows(found: Assessment, model: ModelFlight) -> list[list[str]]:
 
 
 def _is_bound(finding: PartFinding) -> bool:
-    """Whether the value is the most that it may be, and nothing else is known."""
+    """Whether the value is only an upper bound."""
     return finding.word == Verdict.UNDECIDED and finding.low == 0.0
 
 
@@ -92,7 +92,7 @@ def _interval(finding: PartFinding) -> str:
 
 
 def as_json(found: Assessment) -> dict[str, Any]:
-    """The same for a program; SI, rad."""
+    """The assessment for JSON; SI, rad."""
     return {
         "begin_s": found.begin,
         "end_s": found.end,

@@ -1,4 +1,4 @@
-"""Which rows of a long log are read: so few that a log of any size takes bounded memory."""
+"""Thinning of long logs: which rows are read, so that a log of any size takes bounded memory."""
 
 import math
 
@@ -11,5 +11,5 @@ def every(rows: int) -> int:
 
 
 def said(source: str, rows: int, step: int) -> str:
-    """What is told of a log of which one row in `step` is read."""
+    """The report on a log of which one row in `step` is read."""
     return f"{source}: one row in {step} is read of its {rows}, to bound the memory"

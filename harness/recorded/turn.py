@@ -1,8 +1,8 @@
-"""The turn relation of a recorded flight: how fast the air velocity turns, on g tan(bank) / V.
+"""The turn relation of a recorded flight: turn rate of the air velocity over g tan(bank) / V.
 
-In each window of turning flight the direction of (ground velocity - wind) is held against the integral of
-g tan(bank) / V: the slope is the relation, 1 in a coordinated turn. A slope within a window asks nothing of the
-age of the two messages in a steady turn; where the bank changes, the age between them is fitted.
+In each window of turning flight the direction of (ground velocity - wind) is regressed on the integral of
+g tan(bank) / V: the slope is the relation, 1 in a coordinated turn. In a steady turn the slope is independent of the
+latency of the two messages; where the bank changes, the latency between them is fitted.
 """
 
 import math
@@ -19,14 +19,14 @@ from harness.recorded.wind import Fit, GroundTrack
 
 Array = NDArray[np.float64]
 
-STEEPEST = math.radians(60.0)  # beyond it tan(bank) is no turn rate
-LEAST_BANK = math.radians(2.5)  # of a turn
-LEAST_TURN = math.radians(15.0)  # of a window
-WINDOW = 8.0  # s: of a long turn cut into windows
-LEAST_TIME = 3.0  # s, of a window
-_GRID = 0.05  # s
-_AGES = np.arange(-0.5, 1.01, 0.05)  # s: the track's age beyond the bank's
-_SMOOTHED = 1.0  # s
+STEEPEST = math.radians(60.0)  # largest bank at which the turn relation is judged
+LEAST_BANK = math.radians(2.5)  # least bank of a turn
+LEAST_TURN = math.radians(15.0)  # least change of direction in a window
+WINDOW = 8.0  # s: length of the windows of a long turn
+LEAST_TIME = 3.0  # s: shortest window
+_GRID = 0.05  # s: time step of the integrals
+_AGES = np.arange(-0.5, 1.01, 0.05)  # s: candidates for the latency of the track minus that of the bank
+_SMOOTHED = 1.0  # s: length of the moving average of the bank
 
 
 class TurnWindow(NamedTuple):
@@ -39,7 +39,7 @@ class TurnWindow(NamedTuple):
 
 
 class TurnRelation(NamedTuple):
-    """Slope of the turn, and what the bank is off, rad; 0 where only one direction was flown."""
+    """Slope of the turn relation, and the bias of the bank, rad; 0 if only one direction was flown."""
 
     slope: float
     bank_error: float
@@ -88,7 +88,7 @@ def integrals(bank: Channel, begin: float, end: float) -> Integrals:
 
 
 class _Rows(NamedTuple):
-    """Of each window, its rows about their means: the direction, and the integrals of g tan(bank)/V and of g/V."""
+    """For each window, its rows about their means: the direction, and the integrals of g tan(bank)/V and of g/V."""
 
     angle: Array
     turn: Array
@@ -130,6 +130,6 @@ def relation(
 
 
 def age_of(track: GroundTrack, of: Integrals, wind: Fit, at: Sequence[TurnWindow], *, bank_error: bool) -> float:
-    """By how much the track is later than the bank, s: what leaves the least."""
+    """Latency of the track minus that of the bank, s, by least squares."""
     left = [relation(track, of, wind, at, float(age), bank_error=bank_error)[1] for age in _AGES]
     return float(_AGES[int(np.argmin(left))])

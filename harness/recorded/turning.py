@@ -20,26 +20,26 @@ from harness.recorded.turn import TurnWindow
 from harness.recorded.wind import Estimated, Fit, GroundTrack
 from harness.verdict.statistics import LEAST_SEEDS, Sample
 
-STOPPED = 1.0  # m/s: an airspeed sensor that shows less in flight shows nothing
-LEAST_TRACK = 20  # values of the ground velocity
-LEAST_IN_WINDOW = 6  # of them, in a window of turning flight
-WIND_MOVED = 2.0  # m/s, from the beginning to the end of a flight
-MOST_PARTS = 100  # of a flight, that are left out in turn
+STOPPED = 1.0  # m/s: an airspeed sensor that shows less in flight is not working
+LEAST_TRACK = 20  # least number of values of the ground velocity
+LEAST_IN_WINDOW = 6  # least number of them in a window of turning flight
+WIND_MOVED = 2.0  # m/s: largest change of the wind from the beginning to the end of a flight
+MOST_PARTS = 100  # largest number of parts of a flight in the jackknife
 
 
 @dataclass(frozen=True, slots=True)
 class SteadyWind:
-    """The wind that the track tells, m/s, and what goes with it, each with its 95 % interval."""
+    """The wind fitted to the track, m/s, and the airspeed scale, each with its 95 % interval."""
 
     north: tuple[float, float, float]  # value, low, high
     east: tuple[float, float, float]
-    scale: tuple[float, float, float] | None  # true airspeed over the logged one; None where it cannot be told
+    scale: tuple[float, float, float] | None  # true airspeed over the logged one; None if it cannot be fitted
     source: str  # "track", or "autopilot"
 
 
 @dataclass(frozen=True, slots=True)
 class TurnPoint:
-    """A window of turning flight, rad/s: what g tan(bank)/V asks and what was flown."""
+    """A window of turning flight, rad/s: the turn rate g tan(bank)/V and the flown one."""
 
     begin: float  # s
     end: float
@@ -49,7 +49,7 @@ class TurnPoint:
 
 @dataclass(frozen=True, slots=True)
 class Turning:
-    """The turn relation and what it rests on."""
+    """The turn relation, with the wind, latency and windows it was computed from."""
 
     sample: Sample
     barred: str  # why nothing may be decided by it
@@ -60,12 +60,12 @@ class Turning:
 
 
 def turning_of(flight: RecordedFlight, notes: list[str]) -> tuple[Turning | CannotJudgeError, RecordedFlight]:
-    """The turn relation; the flight with its bank the right way round. The notes gain what was found on the way."""
+    """The turn relation; the flight with its bank, inverted if necessary. Findings are added to the notes."""
     try:
         found = _relation(flight, notes)
         if found.sample.mean < 0.0:
             flight = flight.changed(np.negative, *(n for n in ("bank", "bank_command") if n in flight))
-            notes.append("bank: the sign is the wrong way round in this log (left wing down is positive); turned")
+            notes.append("bank: the sign is opposite in this log (left wing down is positive); inverted")
             found = _relation(flight, [])
     except CannotJudgeError as refusal:
         return refusal, flight
@@ -109,7 +109,7 @@ def _sampled_in(track: GroundTrack, window: TurnWindow) -> bool:
 
 
 def _fixed_wind(track: GroundTrack, estimate: Estimated | None, *, measured: bool) -> Fit | None:
-    """The autopilot's wind where the track tells none; None where the track does. Raises `CannotJudgeError`."""
+    """The autopilot's wind if none can be fitted to the track; None if one can. Raises `CannotJudgeError`."""
     if measured and track.span >= air.LEAST_SPAN:
         return None
     span = f"the flight covers {math.degrees(track.span):.0f} deg of the compass"
@@ -125,16 +125,16 @@ def _fixed_wind(track: GroundTrack, estimate: Estimated | None, *, measured: boo
 
 
 def _has_settled(track: GroundTrack) -> None:
-    """Raises `CannotJudgeError` where the wind is another one at the end of the flight than at its beginning."""
+    """Raises `CannotJudgeError` if the wind changes from the beginning to the end of the flight."""
     moved, error = air.change(track)
     if moved > max(WIND_MOVED, 4.0 * error):
         raise CannotJudgeError(f"wind not settled: by the track it changes by {moved:.1f} m/s from beginning to end")
 
 
 def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fixed: Fit | None) -> Turning:
-    """The relation with all that it rests on, and the same without each window and the flight around it.
+    """The turn relation by the jackknife: fitted again without each window and the flight around it.
 
-    Of more than `MOST_PARTS` windows, neighbours are left out together, so that a long flight takes no long time.
+    With more than `MOST_PARTS` windows, neighbours are left out together, to bound the time of long flights.
     """
     right = sum(window.is_right for window in windows)
     bank_error = min(right, len(windows) - right) >= 2
@@ -160,7 +160,7 @@ def _jackknifed(bank: Channel, track: GroundTrack, windows: list[TurnWindow], fi
     with_interval = [(float(v), *(s.interval() or (float(v),) * 2)) for v, s in zip(value, samples, strict=True)]
     _, north, east, scale = with_interval
     wind = SteadyWind(north, east, None if fixed else scale, "autopilot" if fixed else "track")
-    barred = "" if fixed is None else "the wind is the autopilot's, whose error the interval does not hold"
+    barred = "" if fixed is None else "the wind is the autopilot's, whose error the interval does not include"
     points = tuple(_points(track, of, whole, windows))
     return Turning(samples[0], barred, wind, None, points, age)
 
@@ -181,19 +181,19 @@ def _say(notes: list[str], turning: Turning, estimate: Estimated | None, steep: 
     if wind and wind.scale and not wind.scale[1] <= 1.0 <= wind.scale[2]:
         v, low, high = wind.scale
         notes.append(
-            f"airspeed: the track needs {v:.3f} [{low:.3f}, {high:.3f}] times the logged airspeed; with the logged one "
-            f"the turn relation would read {turning.sample.mean / v:.3f}"
+            f"airspeed: scale {v:.3f} [{low:.3f}, {high:.3f}] over the logged airspeed, by the track; with the logged "
+            f"airspeed the turn relation would be {turning.sample.mean / v:.3f}"
         )
     if estimate and estimate.is_reversed:
         notes.append(
-            "wind: the autopilot's points to where the wind comes from; turned round it fits the airspeed to "
-            f"{estimate.misfit:.1f} m/s rms, else to {estimate.other_misfit:.1f}"
+            "wind: the autopilot's points to where the wind comes from; inverted it fits the airspeed to "
+            f"{estimate.misfit:.1f} m/s rms, otherwise to {estimate.other_misfit:.1f}"
         )
     if estimate and wind and wind.source == "track":
         apart = math.hypot(estimate.north - wind.north[0], estimate.east - wind.east[0])
         notes.append(
-            f"wind: the autopilot's estimate, settled from {estimate.settled:.0f} s on, is {apart:.1f} m/s off the "
-            "track's"
+            f"wind: the autopilot's estimate, settled from {estimate.settled:.0f} s on, differs by {apart:.1f} m/s "
+            "from the track's"
         )
     if steep:
         beyond = math.degrees(turn.STEEPEST)

@@ -24,7 +24,7 @@ _Fields = Mapping[str, Array]
 
 
 class Topic(NamedTuple):
-    """What a topic of the log gives: channels by name, each a function of the topic's fields, in SI and rad."""
+    """The channels of a topic by name, each a function of the topic's fields, in SI and rad."""
 
     name: str
     basis: Basis
@@ -111,7 +111,7 @@ _MODES: Mapping[int, str] = MappingProxyType(
 
 
 class _Bounded:
-    """A file that ends what never would: it may be read `_MOST_READ` times over."""
+    """A file that bounds reading: it may be read `_MOST_READ` times over, since pyulog may loop in a damaged file."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb")
@@ -217,7 +217,7 @@ def _add(draft: Draft, topic: Topic, time: Array, fields: Mapping[str, Array]) -
 
 
 def _add_altitude_command(draft: Draft, data: Mapping[str, tuple[Array, Mapping[str, Array]]]) -> None:
-    """The altitude that is asked for is above the sea; the position's origin lies `ref_alt` above it."""
+    """The commanded altitude is above sea level; the origin of the position lies `ref_alt` above it."""
     if _TECS not in data or "vehicle_local_position" not in data:
         return
     time, tecs = data[_TECS]

@@ -1,4 +1,4 @@
-"""Whether a model does what the aircraft did: recorded commands of the surfaces, replayed on the JSBSim model."""
+"""Validation of a JSBSim model: the recorded surface commands of a flight are replayed on it."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,8 +17,8 @@ HORIZONS = (1.0, 2.0, 3.0)  # s
 APART = 0.25  # s between two starts
 _FIT_APART = 0.5  # s: where offsets are fitted, a second from each start
 STEP = 0.005  # s
-ALTITUDE = 100.0  # m: a log tells its own origin alone, and the air is a percent thinner 100 m higher
-SLOWEST = 10.0  # 1/s: surfaces that change more slowly have been something else in between
+ALTITUDE = 100.0  # m: assumed, since a log gives only its own origin; density changes by 1 % in 100 m
+SLOWEST = 10.0  # 1/s: least update rate of the surfaces; slower logs miss changes
 LONGEST_DELAY = 0.15  # s
 LARGEST_OFFSET = math.radians(12.0)
 _NEEDED = (
@@ -28,7 +28,7 @@ _NEEDED = (
 
 
 class Adjusted(NamedTuple):
-    """What is added to the recorded commands: offsets of the surfaces, rad, and how much later they are, s."""
+    """Adjustments of the recorded commands: offsets of the surfaces, rad, and a delay, s."""
 
     aileron: float = 0.0
     elevator: float = 0.0
@@ -81,7 +81,7 @@ def validated(airframe: Path, flights: Sequence[RecordedFlight]) -> Validation:
 
 
 def _checked(airframe: Path, flight: RecordedFlight) -> Iterator[str]:
-    """What goes with a replay of this flight. Raises `LogError`."""
+    """The notes on a replay of this flight. Raises `LogError`."""
     import aircraft
 
     if flight.refusals:

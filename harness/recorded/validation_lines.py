@@ -29,7 +29,7 @@ def lines(found: Validation) -> Iterator[str]:
     aileron, elevator, delay = found.adjusted.adjusted
     yield (
         f"adjusted: aileron {math.degrees(aileron):+.1f} deg, elevator {math.degrees(elevator):+.1f} deg, "
-        f"commands {delay:.3f} s late: with these the rates over {HORIZONS[0]:g} s fit best"
+        f"command delay {delay:.3f} s: the best fit to the rates over {HORIZONS[0]:g} s"
     )
     for note in found.notes:
         yield f"note: {note}"
@@ -44,7 +44,7 @@ def _percent(value: float) -> str:
 
 
 def as_json(found: Validation) -> dict[str, Any]:
-    """The same for a program; SI, rad; without what is not finite."""
+    """The validation for JSON; SI, rad; non-finite values are null."""
 
     def told(fit: ReplayFit) -> dict[str, Any]:
         finite = {name: [v if math.isfinite(v) else None for v in values] for name, values in fit.explained.items()}

@@ -1,4 +1,4 @@
-"""The steady wind that a recorded track tells, and the scale of the airspeed that goes with it.
+"""The steady wind and the scale of the airspeed, fitted to a recorded track.
 
 Every moment of the flight asks |ground velocity - wind| = scale * airspeed: three unknowns, told apart by flying in
 many directions. What the autopilot estimated is held beside it, the right way round and the wrong way round.
@@ -15,9 +15,9 @@ from harness.recorded.recorded_flight import RecordedFlight
 
 Array = NDArray[np.float64]
 
-LEAST_SPAN = math.radians(180.0)  # directions flown: on less, wind and scale stand for each other
-SETTLED_WITHIN = 1.0  # m/s: an estimate has settled once it stays so close to its end
-TURNED_ROUND = 0.8  # a wind with the other sign is the right one where it leaves less than this of the misfit
+LEAST_SPAN = math.radians(180.0)  # least span of directions flown, for wind and scale to be observable
+SETTLED_WITHIN = 1.0  # m/s: an estimate has settled once it stays this close to its end
+TURNED_ROUND = 0.8  # the wind is inverted if that leaves less than this share of the misfit
 _STEPS = 30
 _PIECES = 8
 
@@ -40,7 +40,7 @@ class GroundTrack(NamedTuple):
 
     @property
     def span(self) -> float:
-        """How much of the compass the courses cover, rad: a whole turn less the widest gap."""
+        """Span of the courses, rad: a whole turn minus the widest gap."""
         courses = np.sort(np.arctan2(self.east, self.north))
         gaps = np.diff(np.append(courses, courses[0] + math.tau))
         return float(math.tau - gaps.max())
@@ -48,14 +48,14 @@ class GroundTrack(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Estimated:
-    """What the autopilot estimated of the wind: its mean once it had settled, m/s."""
+    """The autopilot's estimate of the wind: its mean after it settled, m/s."""
 
     north: float
     east: float
     settled: float  # s: from then on it stays within `SETTLED_WITHIN` of its end
-    is_reversed: bool  # it points to where the wind comes from; here it is already turned round
-    misfit: float  # m/s rms, of |ground velocity - wind| beside the airspeed, the better way round
-    other_misfit: float  # the other way round; NaN where there is no airspeed to tell
+    is_reversed: bool  # the log gives where the wind comes from; here it is already inverted
+    misfit: float  # m/s rms: |ground velocity - wind| minus the airspeed, with the better sign
+    other_misfit: float  # with the other sign; NaN without an airspeed
 
 
 def track_of(flight: RecordedFlight) -> GroundTrack:
@@ -75,7 +75,7 @@ def fitted(track: GroundTrack, used: NDArray[np.bool_] | None = None) -> Fit:
 
 
 def change(track: GroundTrack) -> tuple[float, float]:
-    """By how much a wind that changes steadily changes from beginning to end, m/s, and the standard error of that."""
+    """Change of a linearly changing wind from beginning to end, m/s, and its standard error."""
     piece = _PIECES * (track.time - track.time[0]) / (track.time[-1] - track.time[0])
     whole = _fitted(track, None, changing=True)[3:]
     left = np.array([_fitted(track, piece.astype(int) != k, changing=True)[3:] for k in range(_PIECES)])
@@ -105,7 +105,7 @@ def _fitted(track: GroundTrack, used: NDArray[np.bool_] | None, *, changing: boo
 
 
 def misfit(track: GroundTrack, north: float, east: float) -> float:
-    """How far |ground velocity - wind| is from the airspeed at the best scale, m/s rms."""
+    """The rms of |ground velocity - wind| minus the airspeed at the best scale, m/s."""
     known = np.isfinite(track.airspeed)
     size = np.hypot(track.north[known] - north, track.east[known] - east)
     airspeed = track.airspeed[known]

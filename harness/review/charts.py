@@ -40,7 +40,7 @@ class ChartLine(NamedTuple):
 
 
 class ChartAxis(NamedTuple):
-    """From `low` to `high`, with labelled ticks; `scale` is how many units of the picture one of its own has."""
+    """An axis from `low` to `high`, with labelled ticks; `scale` is the number of picture units per unit."""
 
     low: float
     high: float
@@ -111,7 +111,7 @@ def chart_view(chart: Chart) -> rrb.Spatial2DView:
 
 
 def _map(flights: Sequence[StyledFlight]) -> Chart:
-    """From above, with equal scales: tracks, target, circle and wind."""
+    """The view from above, with equal scales: tracks, target, circle and wind."""
     lines, labels = [], []
     longest = max(flights, key=lambda flight: len(flight.log)).log
     east, north, standoff = longest["target_east"], longest["target_north"], longest.flight.law.standoff

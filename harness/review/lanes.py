@@ -32,7 +32,7 @@ COLOURS: Mapping[str, Colour] = MappingProxyType(
         "on and off the limit": _AMBER,
         "at the limit": _RED,
         "quiet": _SLATE,
-        "swings": _AMBER,
+        "oscillates": _AMBER,
         "limit cycle": _RED,
         "normal": _SLATE,
         "bank at its limit": _AMBER,
@@ -51,7 +51,7 @@ COLOURS: Mapping[str, Colour] = MappingProxyType(
 
 
 class Change(NamedTuple):
-    """From `time` on, s, a lane is in this state."""
+    """A change of a lane's state at `time`, s."""
 
     time: float
     state: str
@@ -150,14 +150,14 @@ def command_lane(log: FlightLog) -> list[Change]:
 
 
 def chatter_lane(log: FlightLog) -> list[Change]:
-    """Whether the command swings; whether that is a limit cycle, for as long as circling is judged."""
+    """Whether the command oscillates, and in the judged window whether that is a limit cycle."""
     if not len(log):
         return []
     signals = Signals(log)
     cycles_from = float(log["time"][signals.window.first]) if signals.limit_cycle else math.inf
-    swings = _windows(log, swinging(log["heading_rate_command"], log.flight.guidance_period).astype(float))
-    named = (("limit cycle" if time >= cycles_from else "swings") for time in log["time"][_begins(log)])
-    return _lane(log, [name if part.mean() >= 0.5 else "quiet" for name, part in zip(named, swings, strict=True)])
+    oscillating = _windows(log, swinging(log["heading_rate_command"], log.flight.guidance_period).astype(float))
+    named = (("limit cycle" if time >= cycles_from else "oscillates") for time in log["time"][_begins(log)])
+    return _lane(log, [name if part.mean() >= 0.5 else "quiet" for name, part in zip(named, oscillating, strict=True)])
 
 
 def _circle(log: FlightLog) -> list[Change]:

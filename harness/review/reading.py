@@ -94,7 +94,7 @@ def _read(path: Path) -> dict[str, _Held]:
 
 
 def _held_by_child(path: Path) -> dict[str, _Held]:
-    """The same, read in a process of its own: a damaged file may end the process that reads it."""
+    """The recording, read in a separate process, since a damaged file may crash the reader."""
     done = subprocess.run(
         [sys.executable, "-P", "-c", _CHILD, str(path)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
@@ -111,7 +111,7 @@ def _held_by_child(path: Path) -> dict[str, _Held]:
 
 
 def send(path: Path) -> None:
-    """Writes what a recording holds, or what is wrong with it, to standard output, for the process that asked."""
+    """Writes the content of a recording, or the error, to standard output, for the calling process."""
     try:
         held: object = _held(path)
     except ValueError as error:

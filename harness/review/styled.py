@@ -10,7 +10,7 @@ from harness.plants.ladder import rung
 Colour = tuple[int, int, int]
 
 _MOST_OVERLAID = 2  # flights in one plot
-MOST = 6  # flights in one recording: the colours of more cannot be told apart
+MOST = 6  # largest number of flights in one recording: the number of distinguishable colours
 
 GREY: Colour = (125, 125, 125)
 LIGHT: Colour = (225, 225, 225)

@@ -13,7 +13,7 @@ ENOUGH = 2  # numbers beside a plot: with fewer, its title says its range
 
 
 class Size(NamedTuple):
-    """Of a view, points."""
+    """The margins of a view, points."""
 
     width: float
     height: float

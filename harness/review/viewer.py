@@ -38,7 +38,7 @@ def quiet() -> dict[str, str]:
 
 
 def has_display() -> bool:
-    """Whether a window can be opened here, as far as the environment tells."""
+    """Whether a window can be opened here, according to the environment."""
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 

@@ -1,4 +1,4 @@
-"""Flying the model of somebody else in a process of its own, so that the end of this process is an outcome."""
+"""Flies a third-party model in a separate process, so that a crash of it is an outcome."""
 
 from collections.abc import Mapping
 

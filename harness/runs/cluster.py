@@ -57,7 +57,7 @@ def connected(where: str) -> Iterator["Cluster"]:
             "pip install 'standoff-harness[dask]'"
         ) from None
     for name in ("distributed", "distributed.client"):  # each has a level of its own
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is told in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # failures are reported in one line
     if where.endswith(".json"):
         if not Path(where).is_file():
             raise ClusterError(f"{where}: there is no such file, as `dask scheduler --scheduler-file` writes")
@@ -124,7 +124,7 @@ class Cluster:
     def fly_all(
         self, tasks: Iterator[Task | None], folder: Path, *, wall_time: WallTime, timeout: float, seconds: float
     ) -> Generator[Done | None]:
-        """What `harness.runs.workers.fly_all` does, with the workers of the cluster.
+        """Like `harness.runs.workers.fly_all`, with the workers of the cluster.
 
         `seconds` is the wall time that all flights typically take; zero where that is not known.
         """
@@ -229,7 +229,7 @@ class _Flying:
             yield Done(task, self._with_recording(task, result, recording))
 
     def _failed(self, chunk: _Chunk, error: Exception) -> Iterator[Done]:
-        """Dask has given up the chunk: each of its flights is flown by itself, until one is to blame."""
+        """Dask has given up the chunk: each of its flights is flown alone, to find the one that crashes the worker."""
         if type(error).__name__ != "KilledWorker":
             raise WorkersError(f"a worker of {self.cluster.where} failed: {type(error).__name__}: {error}")
         if not chunk.is_alone:  # Dask blames all that a worker had when it ended
@@ -274,7 +274,7 @@ class _Flying:
 
 
 def _unfit(reports: Mapping[str, Report | BaseException]) -> list[str]:
-    """Of each process that is not fit to fly, in words: what differs, and what to do about it."""
+    """The difference and the remedy, in words, for each process that cannot fly."""
     here = versions()
     wrong: list[str] = []
     met: dict[tuple[str, int], str] = {}
@@ -294,7 +294,7 @@ def _unfit(reports: Mapping[str, Report | BaseException]) -> list[str]:
 
 
 def _remedy(here: Mapping[str, str], there: Mapping[str, str]) -> str:
-    """What to install there."""
+    """The versions to install there."""
     unequal = [name for name in here if here[name] != there.get(name) and name != "processor"]
     packages = [f"{name}=={here[name]}" for name in unequal if name not in (SOURCE, "Python")]
     parts = [f"Python {here['Python']}"] if "Python" in unequal else []

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Comparable(NamedTuple):
-    """What a comparison starts from."""
+    """The input of a comparison."""
 
     flights: "pd.DataFrame"
     assess: Assess  # of the first directory

@@ -65,7 +65,7 @@ def metric_lines(metrics: Mapping[str, Value], earlier: Mapping[str, Value] | No
 
 
 def flown(settings: Mapping[str, Any]) -> str:
-    """What is flown, in one line: law, plant, airframe, length and air."""
+    """The flight in one line: law, plant, airframe, length and air."""
     law, plant = settings["law"], settings["plant"]
     airframe = f" {settings['aircraft']}" if PLANTS[plant].has_airframe else ""
     single = "".join(f", {gain} = {value:g}" for gain, value in _single_gains(law).items())
@@ -90,8 +90,7 @@ def ending(row: Mapping[str, Any]) -> Iterator[str]:
             else f"The flight settled on its circle within {tolerance:g} m in {number(settled)} s."
         )
     if infeasible := row["metrics"].get("infeasible_s"):  # none in a row of an earlier version
-        asked = "air and target ask more than the command's limit"
-        yield f"For {infeasible:.4g} s of it the circle could not be held: {asked}."
+        yield f"For {infeasible:.4g} s the circle was infeasible: wind and target required more than the command limit."
 
 
 def changes(now: Mapping[str, Any], then: Mapping[str, Any]) -> dict[str, tuple[object, object]]:
@@ -142,7 +141,7 @@ def _own_settings(settings: Mapping[str, Any], varying: Collection[str]) -> dict
 
 
 def _air(wind: Mapping[str, Any]) -> str:
-    """What the flight meets, in words."""
+    """The air of the flight, in words."""
     north, east = wind["steady_mps"]
     parts = [f"wind of {north:g} m/s towards north and {east:g} m/s towards east"] if north or east else []
     parts += ["shear"] if any(wind["shear_mps_per_m"]) else []

@@ -18,7 +18,7 @@ _OF_BODY = 0.07  # share of a 6-DOF flight's time that is saved; of the others n
 
 
 class EngineError(HarnessError):
-    """The flights cannot be flown by the engine that is asked for; the message says why."""
+    """The flights cannot be flown by the requested engine; the message gives the reason."""
 
 
 class Engine(NamedTuple):
@@ -29,7 +29,7 @@ class Engine(NamedTuple):
 
 
 def engine_for(size: Survey, asked: str | None, times: float = 1.0) -> Engine:
-    """The engine that is asked for, or else the one that is quicker; `times`: how often the flights are flown.
+    """The requested engine, or else the faster one; `times`: how often the flights are flown.
 
     What is compiled now the workers find on the disk. Raises `EngineError`.
     """

@@ -1,4 +1,4 @@
-"""What runs in a worker of a Dask cluster: it flies chunks of flights in a process of its own.
+"""The code in a worker of a Dask cluster: it flies chunks of flights in a separate process.
 
 That process is the local pool with one worker, so a flight that hangs or ends its process is the same row as at home,
 and the Dask worker lives on.
@@ -42,7 +42,7 @@ class FarFlight(NamedTuple):
 
 
 class Brief(NamedTuple):
-    """What is the same for all chunks of a run."""
+    """The data common to all chunks of a run."""
 
     versions: Mapping[str, str]  # at home: see `versions`
     folder: Path  # of the run, at home
@@ -58,7 +58,7 @@ class Answer(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What a process of the cluster is."""
+    """The versions and threads of a process of the cluster."""
 
     versions: Mapping[str, str]
     threads: int  # in which it would fly at the same time
@@ -67,7 +67,7 @@ class Report(NamedTuple):
 
 @cache
 def versions() -> dict[str, str]:
-    """What decides a flight beside its settings and files, as imported by this process."""
+    """The versions that decide a flight beside its settings and files, as imported by this process."""
     digest = hashlib.blake2b(digest_size=4)
     packages = (Path(aircraft.__file__), Path(autopilot.__file__), Path(__file__).parent)
     for folder in (path.parent for path in packages):
@@ -77,7 +77,7 @@ def versions() -> dict[str, str]:
 
 
 def unlike(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
-    """What makes it impossible to fly there, in words: not another processor, which moves last bits alone."""
+    """The differences that forbid flying there, in words; another processor only changes last bits and is allowed."""
     known = {name: text for name, text in there.items() if name != _PROCESSOR}
     return list(differences(known, here))
 

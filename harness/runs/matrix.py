@@ -48,7 +48,7 @@ class Block:
 class Matrix:
     """All flights of an experiment's file: the block of [matrix], then one block per [[include]].
 
-    Of a `shard` only its part: flights that differ in the plant alone are in the same one.
+    With a `shard` only its part: flights that differ only in the plant are in the same part.
     """
 
     file: SettingsFile
@@ -183,7 +183,7 @@ def read_matrix(file: SettingsFile, *, draft: bool = False) -> Matrix:
     A key that `--set` gives is no axis of the file: it has that value in every flight. Several values, as in
     `--set law.k2=[1,2,3]`, are an axis themselves.
 
-    A `draft` holds its mistakes, for `survey`, which tells them together with those of the flights.
+    A `draft` keeps its mistakes, for `survey`, which reports them together with those of the flights.
     """
     experiment, mistakes = file.draft()
     is_table = isinstance(file.document.get("flight"), Mapping)
@@ -321,7 +321,7 @@ def _table(document: Mapping[str, object], name: str) -> Mapping[str, Any]:
 
 
 def _plain(tables: object) -> Any:
-    """The same tables as JSON can hold them: dates and infinities become text."""
+    """The tables in a form that JSON can hold: dates and infinities become text."""
     if isinstance(tables, Mapping):
         return {str(key): _plain(value) for key, value in tables.items()}
     if isinstance(tables, list | tuple):

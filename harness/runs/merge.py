@@ -14,11 +14,11 @@ from harness.runs.journal import JOURNAL, StoreError, reading
 from harness.runs.store import FLIGHTS, last_run
 
 _FAILED = ", ".join(repr(outcome.value) for outcome in Outcome if outcome.failed)
-_MOST_KEYS = 3  # told one by one
+_MOST_KEYS = 3  # largest number of keys listed one by one
 
 
 class Merged(NamedTuple):
-    """What was made of the runs. Counts are of flights."""
+    """The result of a merge. Counts are of flights."""
 
     flights: int
     twice: int  # flown by several of them, with the same digest
@@ -28,7 +28,7 @@ class Merged(NamedTuple):
 def merge(folders: Sequence[Path], to: Path) -> Merged:
     """Makes one run of these, whole or not at all; each row and recording is kept as it is.
 
-    Of a flight that several have flown the first one's row is kept, a failed one only where all have failed. Raises
+    For a flight in several folders the first row is kept, a failed one only if all have failed. Raises
     `StoreError` for folders without a run, runs of different experiments, and a folder `to` that is not empty.
     """
     if to.exists() and (not to.is_dir() or any(to.iterdir())):
@@ -118,9 +118,9 @@ def _digests(folder: Path) -> dict[str, str]:
 
 
 def told(merged: Merged) -> Iterator[str]:
-    """What there is to know beside the number of flights, in sentences."""
+    """Remarks on a merge, in sentences."""
     if merged.twice:
-        yield f"{merged.twice} flown by several runs, with the same bits: kept once"
+        yield f"{merged.twice} flown by several runs, bit-identical: kept once"
     if merged.apart:
         keys = ", ".join(key[:8] for key in merged.apart[:_MOST_KEYS]) + ("…" if len(merged.apart) > _MOST_KEYS else "")
         yield (

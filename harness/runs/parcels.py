@@ -63,7 +63,7 @@ class Parcels:
     """The parcels of a run, each read once."""
 
     content: dict[str, Parcel] = field(default_factory=dict)  # by number
-    _known: dict[object, ParcelPlace] = field(default_factory=dict)  # by what was asked for
+    _known: dict[object, ParcelPlace] = field(default_factory=dict)  # by the requested object
 
     def packed(self, flight: Flight) -> Packed:
         """The flight, whose files are kept in `content`. Raises OSError when one is missing."""

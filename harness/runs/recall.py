@@ -58,7 +58,7 @@ class Recalled:
 
     @property
     def changes(self) -> str:
-        """What has changed since the row was flown, in words."""
+        """The changes since the row was flown, in words."""
         return f"changed since: {', '.join(self.changed)}" if self.changed else "although nothing known has changed"
 
     def file(self, name: str, overrides: Sequence[str] = ()) -> SettingsFile:

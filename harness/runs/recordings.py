@@ -31,7 +31,7 @@ def wanted(record: str, outcome: Outcome) -> bool:
 
 
 def lacks_recording(folder: Path, key: str, record: str, outcome: Outcome) -> bool:
-    """Whether a finished flight is to be recorded and is not: the disk was full, or another command asked for less."""
+    """Whether a finished flight is to be recorded and is not: the disk was full, or another command requested fewer."""
     return wanted(record, outcome) and not outcome.failed and not recording_path(folder, key).exists()
 
 

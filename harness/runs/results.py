@@ -175,7 +175,7 @@ def as_results(table: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def versions(folder: Path) -> dict[str, dict[str, int]]:
-    """What decided the flights of this directory beside their settings: name -> version -> how many flights.
+    """The versions that decided the flights of this directory: name -> version -> number of flights.
 
     That is law files, inner loop, airframes, target tracks, physics, metrics and libraries.
     """

@@ -54,7 +54,7 @@ class Progress:
     unrecorded: list[str] = field(default_factory=list)  # what went wrong, for each recording that is missing
     seconds: float = 0.0  # since the first flight was sent out
     left: float | None = None  # estimated time until the end, s; None while it is unknown
-    note: str = ""  # what there is to tell beside the counts
+    note: str = ""  # a remark beside the counts
 
 
 def run(matrix: Matrix, folder: Path, options: Options) -> Iterator[Progress]:

@@ -159,7 +159,7 @@ class Store:
 
 
 def examples(journal: sqlite3.Connection) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
-    """Of each version in the store its number, what it is a hash of, and the settings of one of its flights."""
+    """For each version in the store: its number, what it is a hash of, and the settings of one of its flights."""
     rows = journal.execute(
         "SELECT v.id, v.decides, (SELECT settings FROM flights f WHERE f.version = v.id LIMIT 1) AS example "
         "FROM versions v WHERE example IS NOT NULL"
@@ -181,7 +181,7 @@ def positions(
 
 
 def _done(retry_failed: bool) -> str:
-    """The condition that a row is not to be flown again. What the machine may be to blame for is always flown again."""
+    """The condition that a row is not flown again. Outcomes that the machine may have caused are always flown again."""
     again = [outcome for outcome in Outcome if outcome.of_machine or (retry_failed and outcome.failed)]
     return f"outcome NOT IN ({', '.join(repr(outcome.value) for outcome in again)})"
 

@@ -120,7 +120,7 @@ class _Seen:
         self._known: dict[str, _FlightSurvey | None] = {}  # None for a flight that has a mistake
         self._seeds: set[object] = set()
         self._wrong = 0  # flights that have a mistake
-        self._slow: dict[type, tuple[str, ...]] = {}  # what there is to tell of the speed of a law of one's own
+        self._slow: dict[type, tuple[str, ...]] = {}  # remarks on the speed of a user-defined law
 
     def get(self, matrix: Matrix, combination: Combination) -> _FlightSurvey:
         """The survey of a flight. Raises `SettingsError` with its mistakes, of flights that are surveyed once."""

@@ -81,7 +81,7 @@ Fly = Callable[[Task, Path], WorkerResult]
 
 
 def fly_task(task: Task, folder: Path, home: Path | None = None) -> WorkerResult:
-    """Flies a task, in a worker, and writes its recording if the task asks for one.
+    """Flies a task, in a worker, and writes its recording if the task requires one.
 
     `home` is the folder of the run, where that is another than the one to write to.
     """
@@ -108,7 +108,7 @@ class _Chunk:
     size: int = 0  # bytes, of its message
     worker: OwnTime | None = None
     at: tuple[float, float] = (_NONE, _NOT_IN_FLIGHT)  # the flight and its simulated time when last looked at
-    stuck: float = 0.0  # own time of the worker since that changed, s
+    stuck: float = 0.0  # process time of the worker since that changed, s
     hung: int | None = None  # the number of the flight that hangs
     deaths: int = 0  # of workers that held it but had not begun any of its flights
 
@@ -116,7 +116,7 @@ class _Chunk:
 def _how_hung(chunk: _Chunk) -> str:
     simulated = chunk.at[1]
     where = "before its first row or after its last" if simulated == _NOT_IN_FLIGHT else f"at {simulated:.6g} s"
-    return f"{where} it gained no simulated time in {chunk.stuck:.3g} s of its worker's own time"
+    return f"{where} the simulated time did not advance during {chunk.stuck:.3g} s of process time"
 
 
 def fly_all(

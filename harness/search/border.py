@@ -1,4 +1,4 @@
-"""Where an answer changes over a square: which points are asked for next, and the border that is known so far.
+"""The border at which an answer changes over a square: the points to evaluate next, and the border known so far.
 
 The square is a lattice. Its coarse points come first. Then, in every square of the coarse lattice on whose edges the
 answer changes: each change is halved until it lies between two neighbours; two points beside the middle of the line
@@ -21,8 +21,8 @@ Point = tuple[int, int]  # steps along x and y
 
 _LEAST = 10  # coarse squares along a side
 _DIVIDED = 8  # steps in the side of a coarse square
-JUMP = 0.1  # of the reach of a number over the coarse points: more between two neighbours is a jump
-_DECADES = 100.0  # a number that reaches so many times its least is taken by factors
+JUMP = 0.1  # share of the range of a number over the coarse points: a larger step between neighbours is a border
+_DECADES = 100.0  # a number with a larger ratio of largest to least value is taken logarithmically
 
 
 class Square(NamedTuple):
@@ -108,7 +108,7 @@ class BorderSearch:
         return all(point in self.answers for point in self.first)
 
     def asked(self) -> list[Point]:
-        """The points whose answers are asked for next, in order; empty when the border is located."""
+        """The points to evaluate next, in order; empty when the border is located."""
         if missing := [point for point in self.first if point not in self.answers]:
             return missing
         return sorted({point for _, asked in self._visited() for point in asked})
@@ -127,7 +127,7 @@ class BorderSearch:
                 yield from self._visit(x, y, self.coarse)
 
     def _visit(self, x: int, y: int, side: int) -> Iterator[tuple[Square | None, Sequence[Point]]]:
-        """What is known of a square, and what is asked for in it."""
+        """The state of a square, and the points to evaluate in it."""
         around = _around(x, y, side)
         known = [point for point in around if point in self.answers]
         changes = tuple((a, b) for a, b in pairwise((*known, known[0])) if self._differ(a, b))
@@ -161,7 +161,7 @@ class BorderSearch:
         return self.scale.differ(self.answers[a], self.answers[b])
 
     def filled(self) -> NDArray[np.object_]:
-        """What is expected at every point of the lattice, by row (y) and column (x); ... where it is not located.
+        """The expected answer at every point of the lattice, by row (y) and column (x); ... if not located.
 
         A number is interpolated where no border is.
         """

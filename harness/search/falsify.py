@@ -1,4 +1,4 @@
-"""Which settings break a requirement most: a search that tells the prober how robust each trial is."""
+"""A search for the settings that violate a requirement most: the prober receives the robustness of each trial."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,13 +18,13 @@ from harness.search.space import Space
 from harness.search.tune import AT_ONCE, PATIENCE
 from harness.verdict.statistics import upper_bound
 
-GUIDING = 64  # trials of a guide; the same for any number of flights, so that a search goes on with more
-_REFUSED = 1.0  # robustness, for the prober alone, of settings that no flight can have
-_UNKNOWN = -1.0  # robustness of a number that a flight does not have, as of a truth value that is wrong
+GUIDING = 64  # trials of a guide; independent of the number of flights, so that a search can be extended
+_REFUSED = 1.0  # robustness of invalid settings, for the prober only
+_UNKNOWN = -1.0  # robustness of a missing number, as of a wrong truth value
 
 
 class Trial(NamedTuple):
-    """Settings that were flown, and how robust the worst of their flights is."""
+    """Settings that were flown, and the robustness of the worst of their flights."""
 
     candidate: Candidate
     uniform: bool  # drawn uniformly from the ranges
@@ -34,7 +34,7 @@ class Trial(NamedTuple):
 
 
 class UpperBound(NamedTuple):
-    """What the uniform trials say of the share of the ranges in which the requirement is broken."""
+    """The bound from the uniform trials on the share of the ranges in which the requirement is violated."""
 
     trials: int
     broken: int
@@ -64,7 +64,7 @@ class Falsification:
         yield from fly_search(self.batches(), self.space.matrix, folder, options, self.progress)
 
     def batches(self) -> Iterator[Sequence[Candidate]]:
-        """The candidates to be flown next; each batch is judged before the next one is asked for."""
+        """The candidates to be flown next; each batch is judged before the next one is requested."""
         if self.guide:
             yield from self._guided(self.guide)
         prober = self.prober
@@ -90,7 +90,7 @@ class Falsification:
                 self.progress.note = f"{len(self.broken)} broken, worst {self.value(self.worst)}"
 
     def _guided(self, guide: "Falsification") -> Iterator[Sequence[Candidate]]:
-        """The batches of the guide, which the prober knows afterwards; one alone where it knows no such number."""
+        """The batches of the guide, whose result becomes the prober's prior; only one if it lacks the metric."""
         for cheap in guide.batches():
             if guide.trials and not guide.knows:
                 self.progress.total -= (GUIDING - len(guide.trials)) * len(guide.space.conditions)
@@ -100,7 +100,7 @@ class Falsification:
         self.prober = Prober(len(self.space.dimensions), self.seed, guide.prober.guide)
 
     def _asked(self, prober: Prober, uniform: bool) -> tuple[Probe, Candidate] | None:
-        """Settings that a flight can have; None when none are found."""
+        """Valid settings; None if none are found."""
         names = [self.requirement.name] if self.requirement.is_foreseen else []
         for _ in range(PATIENCE):
             probe = prober.ask(uniform)
@@ -128,12 +128,12 @@ class Falsification:
 
     @property
     def knows(self) -> bool:
-        """Whether any flight had what the requirement is about."""
+        """Whether any flight had a value of the requirement's name."""
         return any(facts.get(self.requirement.name) is not None for t in self.trials for facts in t.candidate.facts)
 
     @property
     def worst(self) -> Trial | None:
-        """The trial that breaks the requirement most, or comes closest to that; the earliest of equal ones."""
+        """The trial that violates the requirement most, or comes closest to it; the earliest of equal ones."""
         known = [trial for trial in self.trials if trial.robustness is not None]
         return min(known, key=lambda trial: (not trial.broken, trial.robustness), default=None)
 
@@ -156,7 +156,7 @@ class Falsification:
         return next((i for i, trial in enumerate(self.trials, start=1) if trial.broken), None)
 
     def value(self, trial: Trial) -> str:
-        """What the requirement is about, in the trial's worst flight."""
+        """The value of the requirement's name in the trial's worst flight."""
         fact = trial.candidate.facts[trial.decisive].get(self.requirement.name)
         return "unknown" if fact is None else f"{fact:.4g}" if isinstance(fact, float) else str(fact).lower()
 
@@ -181,10 +181,9 @@ def falsification(
 
 
 def guide_to(space: Space, asked: str | None) -> Space | None:
-    """The space on the plant that is to guide a search: the one that is asked for, or else the nearest cheaper one.
+    """The space on the plant that guides a search: the requested plant, or else the nearest cheaper one.
 
-    Without a word, only 6-DOF flights have a guide, where it can fly their settings. Raises `SearchError` and
-    `SettingsError`.
+    By default only 6-DOF flights have a guide, if it can fly their settings. Raises `SearchError` and `SettingsError`.
     """
     plants = {str(flight.plant) for flight in space.middle.flights}
     if asked is not None:

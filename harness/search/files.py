@@ -1,4 +1,4 @@
-"""What a search leaves beside its flights: what it found as files that `harness fly` takes, and all its trials."""
+"""The files of a search: its results as settings files for `harness fly`, and a table of all trials."""
 
 import csv
 from collections.abc import Sequence

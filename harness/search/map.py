@@ -1,4 +1,4 @@
-"""A map: how flights answer a question over two settings, refined where the answer changes."""
+"""A map of an answer over two settings, refined where it changes."""
 
 import csv
 import math
@@ -27,23 +27,23 @@ from harness.search.space import Space
 CONVERGED = "converged"  # whether a flight has a convergence time
 POINTS, BORDER = "points.csv", "border.csv"
 MOST_PANELS = 12
-LEAST, MOST = 10, 2000  # of the resolution
-_SHARE = 10  # of the full grid's flights: a search takes one in so many at most, unless told,
-_ROUNDS = 4  # or so many times its first round, where that is more
-_DIGITS = 7  # of a setting: steps of a map are small
+LEAST, MOST = 10, 2000  # bounds of the resolution
+_SHARE = 10  # default budget: one in ten of the full grid's flights,
+_ROUNDS = 4  # or four times the first round, if that is more
+_DIGITS = 7  # significant digits of a setting
 _PREDICTED = 9  # points along each side, between which the predicted margin is interpolated
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked of each flight."""
+    """The question that a map answers for each flight."""
 
     text: str
     answer: Callable[[Facts], Answer]
     is_number: bool
 
     def over(self, facts: Sequence[Facts]) -> Answer:
-        """The answer of flights that differ in what is drawn from the seed alone: the median, or the most frequent."""
+        """The combined answer of flights that differ only in their seed: the median, or the most frequent."""
         answers = [self.answer(fact) for fact in facts]
         (most, count), *_ = Counter(answers).most_common()
         if not self.is_number or (most is None and 2 * count >= len(answers)):
@@ -72,7 +72,7 @@ def question(text: str) -> Question:
 
 
 def _of_result(answer: Callable[[Facts], Answer]) -> Callable[[Facts], Answer]:
-    """The same; unknown of a flight whose computation failed."""
+    """The answer, but unknown for a flight whose computation failed."""
     return lambda facts: None if Outcome(str(facts[OUTCOME])).failed else answer(facts)
 
 
@@ -128,7 +128,7 @@ class Map:
         yield from fly_search(self.batches(), self.space.matrix, folder, options, self.progress)
 
     def batches(self) -> Iterator[Sequence[Candidate]]:
-        """The flights of each round; all of a round are known before the next one is asked for."""
+        """The flights of each round; a round is complete before the next one is requested."""
         for number in range(1, self.flights + 1):
             asked = [(panel, point) for panel in self.panels for point in panel.border.asked()]
             if not asked:
@@ -176,7 +176,7 @@ class Map:
         return math.nan if margin is None else margin
 
     def told(self, panel: MapPanel) -> str:
-        """The share of each answer over the area of a panel, of a number its least and its largest; in words."""
+        """The share of each answer over the area of a panel, in words; for a number its least and largest."""
         filled = panel.border.filled().ravel().tolist()
         numbers = [answer for answer in filled if isinstance(answer, float)]
         counts = Counter(_word(answer) or "unknown" for answer in filled if not isinstance(answer, float))

@@ -63,7 +63,7 @@ def _paint(figure: Figure, found: Map) -> None:
 
 
 def heading(found: Map) -> str:
-    """What the colours tell."""
+    """The legend of the colours."""
     text = found.question.text
     if text == CONVERGED:
         return "Does the flight converge?"
@@ -86,7 +86,7 @@ def label(dimension: Dimension) -> str:
 
 
 def _words(answers: Sequence[Answer]) -> list[Answer]:
-    """What is no number, in the order of its colours: no, yes; of words the most frequent first."""
+    """The answers that are not numbers, in the order of their colours: no, yes; words by frequency."""
     different = {answer for answer in answers if answer is not None and not isinstance(answer, float)}
     if different <= {True, False}:
         return [False, True] if different else []
@@ -149,7 +149,7 @@ def _panel(
 
 
 def _at(found: Map, panel: MapPanel) -> dict[str, object]:
-    """What a panel is of: the plant always."""
+    """The title of a panel, which includes the plant."""
     flight = found.space.matrix.file.document["flight"]
     plant = {"plant": flight["plant"]} if isinstance(flight, Mapping) and "plant" in flight else {}
     return {**plant, **panel.at}

@@ -45,7 +45,7 @@ class Space:
         names: Collection[str] = (),
         conditions: Sequence[Combination] | None = None,
     ) -> Candidate:
-        """These settings, ready to be flown over the conditions, all unless told, with what is foreseen by these names.
+        """These settings over the conditions, by default all, with the predictions of these names.
 
         Raises `SettingsError`.
         """

@@ -1,4 +1,4 @@
-"""Which settings do best: a search that tells the sampler what each trial reached over all its conditions."""
+"""A search for the best settings: each trial is flown over all conditions, and its result is passed to the sampler."""
 
 import math
 import statistics
@@ -19,15 +19,15 @@ from harness.search.space import Space
 
 _MOST_GOALS = 2
 AGGREGATES = ("worst", "mean")
-AT_ONCE = 8  # flights, at least, of trials that are asked for before one is told: never by the number of workers
+AT_ONCE = 8  # least number of flights in a batch of trials, independent of the number of workers
 PATIENCE = 300  # candidates refused in a row, before a search ends
-_LEAST = 1e-9  # by which something is missed that lies on its border
-_NEAR = 0.1  # of its value: a requirement that is met by less constrains
-_END = 0.02  # of a range: a setting so near to an end is constrained by it
+_LEAST = 1e-9  # violation of a requirement exactly at its border
+_NEAR = 0.1  # margin over the value, below which a requirement counts as active
+_END = 0.02  # share of a range: a setting this near to an end is constrained by it
 
 
 class Attempt(NamedTuple):
-    """A trial: its settings, what it reached, and what refused it."""
+    """A trial: its settings, its results, and the requirement that rejected it."""
 
     candidate: Candidate
     goals: tuple[float, ...]  # the smaller, the better; empty when it was refused
@@ -57,7 +57,7 @@ class Tuning:
         yield from fly_search(self.batches(), self.space.matrix, folder, options, self.progress)
 
     def batches(self) -> Iterator[Sequence[Candidate]]:
-        """The candidates to be flown next; each batch is judged before the next one is asked for."""
+        """The candidates to be flown next; each batch is judged before the next one is requested."""
         sampler = Sampler(self.space.dimensions, len(self.goals), self.seed)
         conditions = len(self.space.conditions)
         left, size = self.flights // conditions, -(-AT_ONCE // conditions)
@@ -73,7 +73,7 @@ class Tuning:
                 self._judge(sampler, ask, candidate)
 
     def _asked(self, sampler: Sampler) -> tuple[Ask, Candidate] | None:
-        """A candidate that meets what is required beforehand; None when none is found."""
+        """A candidate that meets the predicted constraints; None if none is found."""
         beforehand = [one for one in self.requirements if one.is_foreseen]
         for _ in range(PATIENCE):
             ask = sampler.ask()
@@ -121,7 +121,7 @@ class Tuning:
 
     @property
     def front(self) -> Sequence[Attempt]:
-        """The attempts that none beats in every goal, in the order of the first; of one goal the best alone."""
+        """The Pareto-optimal attempts in the order of the first goal; with one goal only the best."""
         found = [attempt for attempt in self.attempts if attempt.goals]
         front: list[Attempt] = []
         for attempt in sorted(found, key=lambda attempt: attempt.goals):
@@ -131,25 +131,25 @@ class Tuning:
 
     @property
     def refusals(self) -> Mapping[str, tuple[int, bool]]:
-        """By what refused attempts: how many, and whether before they were flown; the most first."""
+        """By reason of rejection: the number of attempts, and whether before a flight; the most frequent first."""
         counts = Counter((attempt.refused_by, not attempt.was_flown) for attempt in self.attempts if attempt.refused_by)
         return {what: (count, before) for (what, before), count in counts.most_common()}
 
     def decisive(self, attempt: Attempt) -> int:
-        """The number of the condition in which an attempt does worst in the first goal."""
+        """The number of the condition in which an attempt is worst in the first goal."""
         ideal = METRICS[self.goals[0]].ideal
         values = [abs(float(facts.get(self.goals[0]) or 0.0) - ideal) for facts in attempt.candidate.facts]
         return values.index(max(values))
 
     def least(self, attempt: Attempt, name: str) -> float | bool | None:
-        """Of the numbers of this name in its flights, the one that comes closest to missing what is asked of it."""
+        """The value of this name with the smallest margin to its requirements, among the flights of an attempt."""
         asked = [one for one in self.requirements if one.name == name]
         facts = min(attempt.candidate.facts, key=lambda facts: min(one.distance(facts) for one in asked))
         fact = facts.get(name)
         return None if isinstance(fact, str) else fact
 
     def constrained(self, attempt: Attempt) -> Iterator[str]:
-        """What keeps an attempt from doing better, in words: requirements met by little, ends of ranges."""
+        """The active constraints of an attempt, in words: requirements barely met, ends of ranges."""
         for one in self.requirements:
             facts = min(attempt.candidate.facts, key=one.distance)
             fact = facts.get(one.name)
@@ -171,7 +171,7 @@ def tuning(
     flights: int,
     seed: int = 0,
 ) -> Tuning:
-    """A search, not begun. Without other words on them, flights last and keep `margin` to the limit cycle.
+    """A search, not begun. By default flights must complete, with at least `margin` to the limit cycle.
 
     Raises `SearchError`.
     """
@@ -199,7 +199,7 @@ def tuning(
 
 
 def _missed(requirements: Sequence[Requirement], facts: Sequence[Facts]) -> tuple[str, float]:
-    """The first requirement that a flight does not meet, in words, and by how much it is missed; below 0: the room."""
+    """The first requirement that a flight violates, in words, and the violation; negative: the margin."""
     off = max((-min(map(one.distance, facts)) for one in requirements), default=-math.inf)
     missed = [one for one in requirements if not all(map(one.is_met, facts))]
     if not missed:

@@ -118,7 +118,7 @@ def _in_file(value: object, unit: Unit) -> object:
 
 
 def _allowed(setting: Setting) -> str:
-    """What a value may be, in words."""
+    """The allowed values, in words."""
     kind = _KINDS.get(setting.kind, "table")
     bounds = " and ".join(f"{_BOUNDS[type(b)]} {_plain(getattr(b, type(b).__name__.lower()))}" for b in setting.bounds)
     words = f"{kind} {bounds}".strip()

@@ -23,7 +23,7 @@ from harness.settings.table import Setting, TableSchema
 
 
 class Checked(NamedTuple):
-    """What a document describes, in SI, or what is wrong with it."""
+    """The content of a document, in SI, or its mistakes."""
 
     value: object  # None if there are mistakes
     mistakes: Sequence[Mistake]

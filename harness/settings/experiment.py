@@ -46,7 +46,7 @@ def document_table(law: type[Law] | None, gains_given: bool) -> TableSchema:
 
 
 def without_law() -> TableSchema:
-    """The schema of a whole file of which the law is told to be wrong already."""
+    """The schema of a whole file whose law has been reported as wrong."""
     return _document(TableSchema({}, lambda **given: None, open=True))
 
 
@@ -62,7 +62,7 @@ def flight_table(law: TableSchema) -> TableSchema:
 
 
 def law_table(law: type[Law] | None, gains_given: bool) -> TableSchema:
-    """The schema of [flight.law]; with `gains_given` it asks for every gain. Without a `law`: that of all laws."""
+    """The schema of [flight.law]; with `gains_given` it requires every gain. Without a `law`: that of all laws."""
     named = {"name": Setting(Literal[*LAWS], "name")}
     known = kind_of_class(law) if law else None
     if known is None:

@@ -63,7 +63,7 @@ class SettingsFile:
         return experiment
 
     def draft(self) -> tuple[Experiment, list[str]]:
-        """The same apart from what is wrong in it, and the mistakes."""
+        """The valid part of the file, and the mistakes."""
         experiment, mistakes = check(schema_of(Experiment), self.document)
         if mistakes:
             rest = mended(self.document, [mistake.key for mistake in mistakes])
@@ -176,7 +176,7 @@ def _leave_out_gains_of_another_law(before: Mapping[str, Any], changed: Settings
         return
     names = law["name"] if isinstance(law["name"], list) else [law["name"]]
     if not all(isinstance(name, str) and (name in LAWS or is_own(name)) for name in names):
-        return  # a mistake, which the check tells
+        return  # a mistake, which the check reports
     shared = {"name", *schema_of(StandoffLaw).settings}
     left_out = [key for key in law if key not in shared and ("flight", "law", key) not in changed.overrides]
     for key in left_out:
@@ -263,7 +263,7 @@ def _table(document: Mapping[str, object], *, run: bool) -> tuple[TableSchema, l
 
 
 def _with_gains_by_rule(described: Checked, document: Mapping[str, Any]) -> Checked:
-    """The same with the gains that a rule decides, but for those that the document gives."""
+    """The flight with the gains decided by its rule, except those that the document gives."""
     flight = described.value
     if not isinstance(flight, Flight):
         return described

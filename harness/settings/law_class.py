@@ -1,4 +1,4 @@
-"""What a class must have to be a law: everything that one of a user's own lacks is said at once."""
+"""The requirements on the class of a law: all that a user-defined class lacks is reported at once."""
 
 import math
 from collections.abc import Iterator, Mapping

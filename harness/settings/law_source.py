@@ -69,7 +69,7 @@ def find(name: str) -> Source:
 
 
 def _stamps(source: Source) -> list[tuple[int, int, int]]:
-    """Of each file when it changed, ns, its size and its number; empty when one is gone."""
+    """Modification time, ns, size and number of each file; empty if one is missing."""
     try:
         return [(of.st_mtime_ns, of.st_size, of.st_ino) for of in map(Path.stat, source.files.values())]
     except OSError:

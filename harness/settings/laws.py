@@ -71,11 +71,11 @@ def kind_of(name: str, *, run: bool) -> LawKind:
         return _own(name).kind
     if name in _LATEST:
         return _LATEST[name].kind
-    raise LawError(f"is {short(name)}, a law of somebody's own, whose code is not run from here")
+    raise LawError(f"is {short(name)}, a user-defined law, whose code is not run from here")
 
 
 def loaded_kind(name: str) -> LawKind | None:
-    """The law of this name where it is at hand; None for one of somebody's own that this process has not loaded."""
+    """The law of this name if it is available; None for a user-defined law that this process has not loaded."""
     return LAWS.get(name) or (_LATEST[name].kind if name in _LATEST else None)
 
 
@@ -205,7 +205,7 @@ def _lies_below(module: ModuleType, roots: set[Path]) -> bool:
 
 
 def _raised(source: Source, error: BaseException) -> str:
-    """What a file raised when it was run, with the line in it."""
+    """The error that a file raised when it was run, with its line."""
     line, trace = 0, error.__traceback__
     while trace:
         line = trace.tb_lineno if trace.tb_frame.f_code.co_filename == str(source.main) else line

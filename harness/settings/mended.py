@@ -9,7 +9,7 @@ from harness.settings.toml_locator import Key
 
 
 class ToldBefore(Enum):
-    """Stands for a value that is wrong, which was told already."""
+    """Stands for a wrong value whose mistake was already reported."""
 
     TOLD = "told"
 

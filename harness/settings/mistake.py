@@ -32,10 +32,10 @@ Places = Callable[[Key], Place]  # the place of each key
 
 
 class Mistake(NamedTuple):
-    """What is wrong at a key."""
+    """A mistake at a key."""
 
     key: Key
-    message: str  # empty if it was told already
+    message: str  # empty if it was already reported
 
 
 def settings_error(mistakes: Sequence[Mistake], place: Places) -> SettingsError:

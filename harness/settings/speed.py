@@ -1,4 +1,4 @@
-"""What a file leaves to the airframe's speed: the nominal airspeed itself, and lengths written as seconds of flight.
+"""Settings derived from the airframe's airspeed: the nominal airspeed, and lengths written as seconds of flight.
 
 Without `start.airspeed_mps` a flight has the airframe's own airspeed. A length may be text such as "15.4 s": the way
 that the aircraft flies in that time at its nominal airspeed. So one experiment serves airframes of different speeds.

@@ -1,4 +1,4 @@
-"""A law of one's own, tried before it is flown: on made-up observations, and within a time."""
+"""Trial of a user-defined law before it is flown: on synthetic observations, and within a time limit."""
 
 import math
 import random
@@ -12,16 +12,16 @@ from contextlib import contextmanager
 from autopilot.guidance import Guidance, Law, Observation, started
 from harness.flight import Flight, context_of
 from harness.plants.plant import End, Outcome
+from harness.plants.turn import bank_of_turn
 
-SLOW = 1e-3  # s per command: a flight of 100 s then takes 2 s more
-ANSWERS_WITHIN = 60.0  # s, in this process; a worker has its own watch
-TRIED_WITHIN = 5.0  # s, of what takes a law much less
-_STEPS, _LONGEST = 60, 0.3  # commands that are timed, s for all of them
-_GRAVITY = 9.81
+SLOW = 1e-3  # s per command, above which a law counts as slow: a flight of 100 s takes 2 s more
+ANSWERS_WITHIN = 60.0  # s: time limit of a command in this process; a worker has its own
+TRIED_WITHIN = 5.0  # s: time limit of the trial
+_STEPS, _LONGEST = 60, 0.3  # number of commands that are timed, and time limit for all of them, s
 
 
 def observations(flight: Flight, count: int, seed: int = 1) -> list[Observation]:
-    """What a law may see on the way, one guidance period after the other: wind, and a target that turns. SI, rad."""
+    """Synthetic observations, one per guidance period, with wind and a turning target. SI, rad."""
     draw, law, v_a = random.Random(seed), flight.law, flight.start.airspeed
     W_x, W_y, turn = (draw.uniform(-0.3 * v_a, 0.3 * v_a) for _ in range(3))
     turn *= 0.01
@@ -32,7 +32,7 @@ def observations(flight: Flight, count: int, seed: int = 1) -> list[Observation]
         rate = 0.05 * math.sin(0.01 * k)
         v_x, v_y = v_a * math.cos(psi) + W_x, v_a * math.sin(psi) + W_y
         v_t_x, v_t_y = v_t * math.cos(course), v_t * math.sin(course)
-        bank = math.atan(rate * v_a / _GRAVITY)
+        bank = bank_of_turn(v_a, rate)
         made.append(
             Observation(
                 x,
@@ -63,13 +63,13 @@ def observations(flight: Flight, count: int, seed: int = 1) -> list[Observation]
 
 
 def answers(flight: Flight, law: Law, seen: Sequence[Observation]) -> list[Guidance]:
-    """What the law answers, from its start, to one observation after the other."""
+    """The law's answers to consecutive observations, from its start."""
     step = started(law, context_of(flight))
     return [step(observation) for observation in seen]
 
 
 def cost(flight: Flight) -> float:
-    """The time that the flight's law takes for a command on this machine, s: the median of a few."""
+    """The computing time of a command of the flight's law on this machine, s: a median."""
     step, times = started(flight.law, context_of(flight)), []
     end = time.perf_counter() + _LONGEST
     for observation in observations(flight, _STEPS):
@@ -82,7 +82,7 @@ def cost(flight: Flight) -> float:
 
 
 def slowness(flight: Flight) -> Iterator[str]:
-    """A sentence on a law that is slow. One that fails says nothing here: its flight tells how."""
+    """A sentence on a law that is slow. A law that raises is not reported here, but by its flight."""
     try:
         with within(TRIED_WITHIN):
             each = cost(flight)
@@ -98,9 +98,9 @@ def slowness(flight: Flight) -> Iterator[str]:
 
 @contextmanager
 def within(seconds: float) -> Iterator[Callable[..., None]]:
-    """Raises `End` inside a law that takes longer; what is yielded, called, starts the time anew.
+    """Raises `End` inside a law that takes longer. Yields a function that restarts the time.
 
-    Only in the main thread, where Python runs a signal's handler; elsewhere nothing happens.
+    Only in the main thread, where Python runs signal handlers; elsewhere it has no effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda *_: None

@@ -50,7 +50,7 @@ def scorecard(card: Scorecard, comparison: Comparison) -> Iterator[str]:
     if not comparison.assumption:
         yield from (f"  {line}" for line in table(list(CHANGE_HEADINGS), changes(card)))
         return
-    headings = ["part", "verdict", "worst cell, 95 % interval", "asked", "where"]
+    headings = ["part", "verdict", "worst cell, 95 % interval", "margin", "where"]
     rows: list[tuple[str, ...]] = []
     remarks: list[str] = []
     for group in Group:
@@ -87,7 +87,7 @@ def _row(card: Scorecard, part: Part) -> tuple[str, ...]:
 
 
 def notes_on(card: Scorecard, part: Part) -> Iterator[str]:
-    """Under what condition, what the design cannot tell apart, and why cells are undecided."""
+    """The conditions, the axes that the design cannot separate, and why cells are undecided."""
     conclusion = card.conclusion(part.column)
     if condition := conclusion.condition:
         word = "holds" if condition.word is Verdict.HOLDS else "fails"
@@ -95,7 +95,7 @@ def notes_on(card: Scorecard, part: Part) -> Iterator[str]:
         yield f"{part.title} {word} if {condition.text} ({having}{counted(condition.of, 'cell')})"
     if conclusion.confounded:
         together = " and ".join(conclusion.confounded)
-        yield f"{part.title}: {together} vary together, so the design cannot tell which matters"
+        yield f"{part.title}: {together} vary together, so the design cannot separate them"
     undecided = [j for j in card.of(part.column) if j.word == Verdict.UNDECIDED]
     if undecided:
         needed = sorted(j.seeds_needed for j in undecided if j.seeds_needed)
@@ -109,7 +109,7 @@ def worst(card: Scorecard, part: Part) -> Judgement:
 
 
 def compared(comparison: Comparison) -> Iterator[str]:
-    """What was compared, and what varies; then the flights that were lost, before all that is said of the others."""
+    """What was compared and what varies, then the lost flights."""
     seeds = comparison.pairs.other["seed"].nunique()
     varies = ", ".join(f"{axis} ({len(values)})" for axis, values in comparison.axes.items())
     yield (
@@ -172,12 +172,12 @@ def worded(conclusion: Conclusion) -> str:
         return f"fails in all {of}"
     text = f"fails in {conclusion.fails} of {of}" + (f", holds in {conclusion.holds}" if conclusion.holds else "")
     if conclusion.confounded:
-        text += f"; {' and '.join(conclusion.confounded)} vary together: the design cannot tell which matters"
+        text += f"; {' and '.join(conclusion.confounded)} vary together: the design cannot separate them"
     return text
 
 
 class ChangeLine(NamedTuple):
-    """What a comparison says of one metric, all in words."""
+    """The result for one metric, in words."""
 
     metric: str
     found: str  # lower, higher, alike or undecided, in how many cells
@@ -210,7 +210,7 @@ def change_summary(card: Scorecard) -> Iterator[str]:
 
 
 def _changed(card: Scorecard) -> Iterator[tuple[str, Judgement, Counter[str]]]:
-    """Of the metrics with a margin, and of those that differ anywhere: title, largest difference, words by cell."""
+    """For metrics with a margin, and those that differ anywhere: title, largest difference, words by cell."""
     for column in dict.fromkeys(judgement.column for judgement in card.judgements):
         judgements = card.of(column)
         counts = Counter(map(_direction, judgements))
@@ -240,7 +240,7 @@ def place(at: Mapping[str, object]) -> str:
 
 
 def missing_flights(comparison: Comparison) -> Iterator[str]:
-    """The flights that would tell apart what varies together, as options to type."""
+    """The flights that would separate what varies together, as options to type."""
     for card in comparison.answering:
         for part in card.parts:
             for cell in card.conclusion(part.column).missing:
@@ -291,7 +291,7 @@ def value(judgement: Judgement) -> str:
 
 
 def bound(judgement: Judgement, part: Part) -> str:
-    """What a difference has to stay within."""
+    """The margin of a difference."""
     low, high = judgement.bounds
     match part.kind:
         case "at most":

@@ -54,7 +54,7 @@ class Scorecard:
         return [part for part in PARTS.values() if part.column in known]
 
     def conclusion(self, column: str) -> Conclusion:
-        """What all its cells say of a part; kept, since of many cells it takes seconds."""
+        """The conclusion on a part from all cells; cached, since with many cells it takes seconds."""
         if column not in self._concluded:
             self._concluded[column] = conclude(self.of(column), self.axes)
         return self._concluded[column]
@@ -102,12 +102,12 @@ class Comparison:
 
     @property
     def assumption(self) -> bool:
-        """Whether it asks for the coordinated-flight assumption: plants beside the one that the paper assumes."""
+        """Whether it tests the coordinated-flight assumption: plants against the one that the paper assumes."""
         return self.by == "plant" and self.baseline == BASELINE
 
     @cached_property
     def axes(self) -> dict[str, list[object]]:
-        """What was set to several values on any airframe."""
+        """The settings with several values on any airframe."""
         several: dict[str, list[object]] = {}
         table = spread(self.pairs.other)
         if table["aircraft"].nunique() > 1 and self.by != "aircraft":

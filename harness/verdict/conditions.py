@@ -6,7 +6,7 @@ A condition is a stretch of flown values of one axis, or of two. It is named onl
 - for each of its axes there are two cells alike in everything else, one within that has the word and one outside that
   has the opposite word.
 
-So an axis that merely varies together with the cause is never named: the design cannot tell the two apart, and the
+So an axis that merely varies together with the cause is never named: the design cannot separate the two, and the
 flights that would are printed instead.
 """
 
@@ -37,15 +37,15 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Conclusion:
-    """What all cells together say of a part: that it holds everywhere, under a condition, or fails somewhere."""
+    """The conclusion on a part from all cells: it holds everywhere, under a condition, or fails somewhere."""
 
     word: Verdict
     holds: int  # cells
     fails: int
     of: int
     condition: Condition | None = None  # where it holds, else where it fails
-    confounded: tuple[str, ...] = ()  # axes that the design cannot tell apart
-    missing: tuple[Mapping[str, object], ...] = ()  # cells that would tell them apart
+    confounded: tuple[str, ...] = ()  # axes that the design cannot separate
+    missing: tuple[Mapping[str, object], ...] = ()  # cells that would separate them
 
 
 def conclude(cells: Sequence[Judgement], across: Mapping[str, Sequence[object]]) -> Conclusion:
@@ -157,7 +157,7 @@ def _text(axis: str, some: Values, values: Sequence[object]) -> str:
 def _untold(cells: Sequence[Judgement]) -> tuple[tuple[str, ...], tuple[Mapping[str, object], ...]]:
     """The axes in which the most similar cells of opposite words differ, and the cells in between that were not flown.
 
-    Empty where they differ in one axis: then the axis matters there, though no stretch of its values tells where.
+    Empty where they differ in one axis: then the axis matters there, though no range of its values is decided.
     """
     holding = [cell for cell in cells if cell.word == Verdict.HOLDS]
     failing = [cell for cell in cells if cell.word == Verdict.FAILS]

@@ -25,7 +25,7 @@ class Point(NamedTuple):
 
 
 class CurveSet(NamedTuple):
-    """What was flown at the same values of all other axes."""
+    """The flights at the same values of all other axes."""
 
     axis: str
     at: Mapping[str, object]  # the other axes

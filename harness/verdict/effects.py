@@ -1,4 +1,4 @@
-"""What each rung of the ladder of plants adds, and each disturbance: one condition at a time, no mean over several.
+"""The effect of each plant of the ladder, and of each disturbance: one condition at a time, no mean over several.
 
 Along the ladder the same seeds count on every rung, so the steps add up to the whole. A disturbance is added alone to
 the same flight without it; what it adds to the *difference* between two plants is the difference of what it adds to
@@ -43,7 +43,7 @@ DISTURBANCES = (
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What one thing adds to a metric in one cell."""
+    """The effect of a plant or a disturbance on a metric in one cell."""
 
     metric: str
     what: str  # the rung's addition, or the disturbance
@@ -113,7 +113,7 @@ def _ladder(aircraft: str, at: Mapping[str, object], metric: str, on: Mapping[st
 
 
 def _adds(below: str, above: str) -> str:
-    """What a rung adds to one below it, rungs that were not flown included."""
+    """The effect of a plant over a lower one, including the plants between that were not flown."""
     return ", ".join(kind.adds for kind in list(PLANTS.values())[rung(below) + 1 : rung(above) + 1])
 
 
@@ -142,7 +142,7 @@ def _cells(flights: pd.DataFrame, without: Sequence[str] = ()) -> Iterator[tuple
 
 @dataclass(frozen=True, slots=True)
 class Disturbed:
-    """What a disturbance alone adds in one cell: on two plants, and to the difference between them."""
+    """The effect of a single disturbance in one cell: on two plants, and on the difference between them."""
 
     aircraft: str
     at: Mapping[str, object]
@@ -151,7 +151,7 @@ class Disturbed:
 
 
 def disturbances(flights: pd.DataFrame, plants: tuple[str, str]) -> Iterator[Disturbed]:
-    """Of every disturbance flown, level by level, in every cell that is undisturbed but for it."""
+    """The effect of every disturbance, level by level, in every cell without other disturbances."""
     for aircraft, of_one in flights.groupby("aircraft"):
         for disturbance in DISTURBANCES:
             yield from _disturbed(str(aircraft), of_one.reset_index(drop=True), disturbance, plants)

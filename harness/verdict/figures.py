@@ -55,7 +55,7 @@ def intervals(figure: Figure, card: Scorecard, parts: Sequence[Part]) -> None:
 
 
 def waterfall(figure: Figure, ladders: Sequence[Ladder]) -> None:
-    """What each rung of the ladder adds in one cell, a panel per metric, with the intervals of the steps."""
+    """The effect of each plant of the ladder in one cell, a panel per metric, with the intervals of the steps."""
     panels = figure.subplots(1, len(ladders), squeeze=False)[0]
     for axes, ladder in zip(panels, ladders, strict=True):
         _falls(axes, ladder)
@@ -132,7 +132,7 @@ def heat_maps(figure: Figure, grids: Sequence[Grid]) -> None:
 
 
 def _scale(known: Sequence[float]) -> Normalize:
-    """Of colours: logarithmic where the values differ by decades."""
+    """The scale of colours: logarithmic if the values differ by decades."""
     low, high = min(known, default=0.0), max(known, default=0.0)
     if low > 0.0 and high > 100.0 * low:
         return LogNorm(low, high)

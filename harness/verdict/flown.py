@@ -1,4 +1,4 @@
-"""What was flown: how the flights of each combination of settings ended, and their metrics."""
+"""Outcomes and metrics of the flights of each combination of settings."""
 
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -12,7 +12,7 @@ from harness.tables import number, table
 from harness.verdict.comparison import Comparison
 from harness.verdict.pairs import CompareError, is_ordered, ordered, shown, spread
 
-DEFAULT = ("chatters", "range_error_rms_m")  # drawn where none is asked for
+DEFAULT = ("chatters", "range_error_rms_m")  # drawn by default
 ROUNDING = 1e-6  # of any metric: no map of rounding noise
 BEYOND = "*"  # marks a cell in which a limit cycle is predicted
 _MOST_GRIDS = 12
@@ -57,7 +57,7 @@ class Grid:
         return (cell.value - min(known)) / reach if reach > ROUNDING and not math.isnan(cell.value) else 0.0
 
     def text(self, cell: GridCell | None) -> str:
-        """What stands in a cell."""
+        """The text of a cell."""
         return "" if cell is None else number(None if math.isnan(cell.value) else cell.value)
 
 

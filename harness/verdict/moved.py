@@ -30,7 +30,7 @@ class Moved(NamedTuple):
 
 
 def sentences(comparison: Comparison) -> Iterator[str]:
-    """What differs between the directories, and how many flights it moved. Nothing of another comparison."""
+    """The differences between the directories, and the number of changed flights; empty for other comparisons."""
     if comparison.by != DIRECTORY:
         return
     pairs = comparison.pairs

@@ -230,7 +230,7 @@ def spread(flights: pd.DataFrame) -> pd.DataFrame:
 
 
 def axes(table: pd.DataFrame, without: Iterable[str] = ()) -> dict[str, list[object]]:
-    """The settings that were set, not drawn, to several values; with the values in order. Of a table as `spread` gives.
+    """The settings that were set, not drawn, to several values; with the values in order. For a table from `spread`.
 
     What takes one value only within every seed was drawn. What follows from another axis (a law's gains, a duration
     set with a radius) is that axis.

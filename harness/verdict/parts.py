@@ -15,7 +15,7 @@ Bounds = tuple[float | None, float | None]
 
 
 class Group(StrEnum):
-    """What a part belongs to."""
+    """The group of a part."""
 
     COORDINATED = "coordinated flight"  # what a pilot calls so
     FOLLOWED = "heading rate followed at once"
@@ -37,7 +37,7 @@ class Part:
     drawn: bool = True  # False: it follows from the settings, whatever the seed
 
     def bounds(self, margins: Mapping[str, float]) -> Bounds:
-        """Of the difference, in the column's unit; shares of the baseline's value for a relative one."""
+        """The bounds of the difference, in the column's unit; shares of the baseline's value if relative."""
         margin = margins[self.margin]
         match self.kind:
             case "at most":

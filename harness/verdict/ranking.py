@@ -1,7 +1,7 @@
 """Orders: which law is better on a plant, in one condition, and where another plant gives another order.
 
 A condition is one combination of all that was set, but for plant, law and seed; nothing is ever averaged over several.
-Of two laws in a condition one is better, or they tie, or the flights do not tell. They tie where their ratio is shown
+For two laws in a condition one is better, or they tie, or the order is undecided. They tie where their ratio is shown
 to lie within the tie's bounds, and differ where it is shown to lie outside: by the mean of its logarithm over paired
 seeds, with Holm's adjustment over all pairs of laws on the plant. A ratio in which the seeds agree is exact.
 """
@@ -43,7 +43,7 @@ class Tie(NamedTuple):
 
 
 class Relation(StrEnum):
-    """What the flights say of the first of two laws against the second."""
+    """The relation of the first of two laws to the second."""
 
     BETTER = "better"
     WORSE = "worse"
@@ -75,7 +75,7 @@ class Order:
     left_out: Mapping[str, int]  # laws without a place, and in how many seeds they were lost or have no such number
 
     def relation(self, law: str, other: str) -> Relation:
-        """What the flights say of a law against another."""
+        """The relation of a law to another."""
         if (law, other) in self.relations:
             return self.relations[law, other]
         opposite = {Relation.BETTER: Relation.WORSE, Relation.WORSE: Relation.BETTER}
@@ -107,7 +107,7 @@ class Ranking:
     orders: Mapping[str, Order]  # by plant, up the ladder
 
     def changes(self, plant: str, reference: str = BASELINE) -> list[Reordered]:
-        """The pairs of laws that the flights tell another order or tie of than on the reference; reversals first."""
+        """The pairs of laws whose order or tie differs from that on the reference; reversals first."""
         here, there = self.orders[reference], self.orders[plant]
         found = []
         for law, other in combinations([law for law in here.places if law in there.places], 2):
@@ -117,7 +117,7 @@ class Ranking:
         return sorted(found, key=lambda change: not change.is_reversal)
 
     def undecided(self, plant: str, reference: str = BASELINE) -> tuple[int, int]:
-        """In how many pairs of laws one of the two plants does not tell, and how many pairs there are."""
+        """The number of pairs of laws that are undecided on one of the two plants, and the number of pairs."""
         here, there = self.orders[reference], self.orders[plant]
         pairs = list(combinations([law for law in here.places if law in there.places], 2))
         told = [Relation.UNDECIDED not in (here.relation(*pair), there.relation(*pair)) for pair in pairs]
@@ -183,7 +183,7 @@ def _ranking(table: pd.DataFrame, at: Mapping[str, object], metric: str, tie: Ti
 def _relations(
     by_seed: pd.DataFrame, laws: Iterable[str], tie: Tie, significance: float, *, drawn: bool
 ) -> dict[tuple[str, str], Relation]:
-    """Of each pair of laws, whose numbers are columns with a row for each seed."""
+    """The relation of each pair of laws, whose numbers are columns with a row for each seed."""
     pairs = list(combinations(laws, 2))
     samples = [tie.ratios(by_seed[law], by_seed[other], drawn=drawn) for law, other in pairs]
     shown = [evidence(of, -tie.bound, tie.bound) for of in samples]

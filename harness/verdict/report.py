@@ -76,7 +76,7 @@ def page(
 ) -> str:
     """The HTML page; `logs` by key: flights of `to_draw` that are at hand; `maps` by folder: pictures, SVG.
 
-    `saved`: what a cheaper plant saves as a control variate, where that is asked.
+    `saved`: the saving by a cheaper plant as a control variate, if requested.
     """
     added = list(_disturbances(comparison)) if comparison.by == "plant" else []
     judged_parts = [part for part in PARTS.values() if any(part in card.parts for card in comparison.scorecards)]
@@ -145,8 +145,8 @@ def _intervals(card: Scorecard) -> Iterator[Drawing]:
             svg = draw(partial(figures.intervals, card=card, parts=parts), height=1.2 + 0.16 * cells)
             yield Drawing(
                 svg,
-                f"{group}: the difference in each cell with its {100 * CONFIDENCE:.0f} % interval. Shaded: what is "
-                "asked. Circle: holds; cross: fails; diamond: undecided.",
+                f"{group}: the difference in each cell with its {100 * CONFIDENCE:.0f} % interval. Shaded: the "
+                "margin. Circle: holds; cross: fails; diamond: undecided.",
             )
 
 
@@ -226,7 +226,7 @@ def _side_by_side(keys: Mapping[str, str], logs: Mapping[str, FlightLog]) -> str
 
 
 def _to_see(before: str, after: str, first: str, second: str) -> str:
-    """What to type to see two flights."""
+    """The command that shows two flights."""
     if before == after:
         return f"harness view {before} --flight {first} --flight {second}"
     return f"harness fly {after}:{second} --against {before}:{first}"
@@ -261,7 +261,7 @@ def _chosen(comparison: Comparison) -> Mapping[int, list[str]]:
 
 
 def origin_of(folders: Sequence[str], runs: Sequence[Mapping[str, object]]) -> Origin:
-    """From the provenance of each folder's run."""
+    """The origin from the provenance of each folder's run."""
     title = " and ".join(str(run["title"] or folder) for folder, run in zip(folders, runs, strict=True))
     if len(runs) > 1 and len({run["title"] for run in runs}) < len(runs):
         title = " and ".join(folders)

@@ -34,14 +34,14 @@ def lines(comparison: Comparison, mapped: str | None = None) -> Iterator[str]:
             yield from scorecard(card, comparison)
     else:
         yield ""
-        yield f"{comparison.by} = {', '.join(comparison.values[:-1])}: --csv and `harness report` tell each difference."
+        yield f"{comparison.by} = {', '.join(comparison.values[:-1])}: --csv and `harness report` list each difference."
     if not comparison.assumption:
         yield ""
         yield "Lower, higher: by more than the margin, where there is one; alike: shown to lie within it."
     options = list(dict.fromkeys(missing_flights(comparison)))
     if options:
         yield ""
-        yield "Flights that would tell apart what varies together:"
+        yield "Flights that would separate what varies together:"
         yield from (f"  {option}" for option in options[:MOST_LISTED])
     yield from unpaired(comparison.unpaired)
     yield ""
