@@ -103,7 +103,7 @@ def feasibility_line(flight: Flight) -> str:
     margin, needed = (math.degrees(rate) for rate in (feasibility_margin(flight), needed_rate(flight)))
     rate = flight.law.command.replace("_", " ")
     return (
-        f"The circle is {'feasible' if margin >= 0 else 'INFEASIBLE'}: holding it takes a {rate} of up to "
+        f"The circle is {'feasible' if margin >= 0 else 'INFEASIBLE'}: holding it requires a {rate} of up to "
         f"{needed:.2f} deg/s, the limit is {math.degrees(flight.law.max_heading_rate):g} deg/s "
         f"(margin {margin:+.2f} deg/s)."
     )
@@ -125,7 +125,7 @@ def warnings(flight: Flight, *, of_circle: bool = True) -> list[str]:
     if of_circle and is_outrun(flight):
         sentences.append(f"the circle is infeasible: {_outrun(flight)}")
     elif of_circle and feasibility_margin(flight) < 0:
-        sentences.append("the circle is infeasible: holding it takes more than the heading-rate limit")
+        sentences.append("the circle is infeasible: holding it requires more than the heading-rate limit")
     if flight.wind.gusts and (gusty := _strongest_wind(flight)) >= v_a:
         sentences.append(f"wind and gusts reach {gusty:.3g} m/s, the airspeed is {v_a:g} m/s")
     estimator = flight.estimator
@@ -155,7 +155,7 @@ def warnings(flight: Flight, *, of_circle: bool = True) -> list[str]:
 
 def _outrun(flight: Flight) -> str:
     return (
-        "it cannot be held at any heading rate, since air and target move against each other at up to "
+        "it cannot be held at any heading rate, since the wind relative to the target reaches "
         f"{relative_speed(flight):.5g} m/s and the airspeed is {flight.start.airspeed:g} m/s"
     )
 

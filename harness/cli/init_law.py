@@ -29,9 +29,9 @@ class MyLaw(StandoffLaw):
     gain_sets: ClassVar = {"gentle": {"lean": 0.02, "k": 0.5}, "firm": {"lean": 0.02, "k": 2.0}}
 
     def start(self, context: Context) -> LawStep:
-        """The law in flight: a new function for each flight. What it remembers belongs in here, never to the class.
+        """The law in flight: a new function for each flight. Its state belongs in here, never in the class.
 
-        `context` has the guidance period, the nominal airspeed, the seed, and whether the plant answers at once; with
+        `context` has the guidance period, the nominal airspeed, the seed, and whether the inner loop is ideal; with
         `uses_response = True` in the class also the identified response of the aircraft, or None.
         """
         lean, k = self.lean, self.k
@@ -50,17 +50,17 @@ class MyLaw(StandoffLaw):
         step = standoff_step(self, reach)  # the geometry, the limit, and the other direction
 
         def told(observation: Observation) -> Guidance:
-            """From what is seen to the command. `telling` puts channels of its own into the log, here `law_leaning`."""
+            """The command for an observation. `telling` adds channels to the log, here `law_leaning`."""
             guidance = step(observation)
             return telling(guidance, leaning=atan(lean * guidance.range_error))
 
         return told
 
     def broken_conditions(self, speed_ratio: float) -> list[str]:
-        """Sentences on what these gains break of the law's theory; `speed_ratio` is (v_t + v_w) / v_a."""
+        """The violated conditions of the law's theory, in sentences; `speed_ratio` is (v_t + v_w) / v_a."""
         return ["v_t + v_w is not below v_a"] if speed_ratio >= 1.0 else []
 
     # A law with memory returns `autopilot.guidance.Remembering(step, memory)`, which can be compiled: its step is given
     # the memory and gives back the next one. It may also have a method
     #     def linearised(self, context: Context, amplitude: float) -> autopilot.linear.Linear:
-    # from (heading error, range error) to its command: from it `harness predict` has the margin to a limit cycle.
+    # from (heading error, range error) to its command, from which `harness predict` computes the gain margin.

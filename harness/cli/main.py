@@ -46,12 +46,12 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
             "show": Entry("show:show", "Show the flights of a run, or one of them in full."),
             "compare": Entry("compare:compare", "Compare the flights of a run that differ in one setting alone."),
             "map": Entry("map:map_", "Map where the answer changes over two settings."),
-            "falsify": Entry("falsify:falsify", "Search for the flight that breaks a requirement most."),
+            "falsify": Entry("falsify:falsify", "Search for the flight that violates a requirement most."),
             "tune": Entry("tune:tune", "Search for the settings that do best."),
             "report": Entry("report:report", "Write the comparison as one HTML page with figures."),
         },
         "Real flights": {
-            "assess": Entry("assess:assess", "Judge the assumption on the log of a real flight."),
+            "assess": Entry("assess:assess", "Judge the coordinated-flight assumption on the log of a real flight."),
             "validate": Entry(
                 "validate:validate", "Replay the recorded surface commands of a flight on an airframe's model."
             ),

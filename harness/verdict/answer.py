@@ -125,17 +125,17 @@ def compared(comparison: Comparison) -> Iterator[str]:
     outrun, infeasible = int((margin == -math.inf).sum()), int(((margin < 0.0) & (margin > -math.inf)).sum())
     if outrun:
         yield (
-            f"In {counted(outrun, 'pair')} the circle cannot be held at any heading rate: air and target move against "
-            "each other as fast as the aircraft flies."
+            f"In {counted(outrun, 'pair')} the circle cannot be held at any heading rate: the wind relative to the "
+            "target reaches the airspeed."
         )
     if infeasible:
-        yield f"In {counted(infeasible, 'pair')} the heading-rate limit is below what holding the circle takes."
+        yield f"In {counted(infeasible, 'pair')} the heading-rate limit is below the rate that the circle requires."
     reference = comparison.pairs.reference
     astray = int((~reference["circles"].astype(bool) & (reference["lost"] == 0.0)).sum())
     if astray:
         yield (
             f"In {counted(astray, 'pair')} the flight of {comparison.baseline} does not circle its target: "
-            "such pairs do not count in what circling costs."
+            "such pairs are excluded from the metrics of circling."
         )
     yield from flown.quiet(comparison)
     if comparison.unpaired:
