@@ -1,6 +1,6 @@
 """Running a function in a process of its own, with limits: what it does to that process, it does not do to this one.
 
-A server, which is started once for each thread that asks, has imported the module of the function; each call is a fork
+A server, which is started once for each calling thread, has imported the module of the function; each call is a fork
 of it, and takes some milliseconds. Server and child end with this process, and use pipes alone: no file and no socket
 that others could find.
 """
@@ -124,7 +124,7 @@ class _Server:
             raise
 
 
-_servers: list[_Server] = []  # those that answer nobody now: a thread that asks has one for itself
+_servers: list[_Server] = []  # idle servers: each thread with a call uses its own
 
 
 def _idle() -> _Server:
@@ -180,7 +180,7 @@ def _awaited(answers: Connection, calls: Connection, seconds: float) -> tuple[bo
 
 _TELL_EVERY = 0.5  # s
 _NOTHING = (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)  # no file has room for a byte, and nothing dumps a core
-_told: dict[str, Any] = {}  # where to answer, the limit in s, and when it was last told that the function goes on
+_told: dict[str, Any] = {}  # where to answer, the limit in s, and the time of the last progress report
 
 
 def alive(*_: object) -> None:

@@ -1,4 +1,4 @@
-"""Flights that differ in one setting alone, compared: what a notebook asks of the results of a run."""
+"""Comparison of flights that differ in one setting, for notebooks."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,7 +27,7 @@ def compare(
     *,
     assess: Assess | None = None,
 ) -> Comparison:
-    """Pairs the flights that differ in the setting `by` alone, and says how their metrics differ.
+    """Pairs the flights that differ in the setting `by` alone, and compares their metrics.
 
     - `results`: a directory of `run`, several of them, or a DataFrame as `load_results` or `pd.read_parquet` gives it.
     - `by`: the setting, a column of the results; single gains change with a law or its set, nothing else does. None is

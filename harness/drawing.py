@@ -10,7 +10,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-# Okabe and Ito's, which colour-blind eyes tell apart, the strongest contrasts first
+# Okabe and Ito's, which are distinguishable for colour-blind readers, the strongest contrasts first
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 INK, FAINT = "#1c2733", "#9aa5b1"
 COLUMN, PAGE = 3.5, 7.1  # in: widths of a figure in print

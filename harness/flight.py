@@ -102,7 +102,7 @@ def context_of(flight: Flight) -> Context:
 
 
 def told_response(flight: Flight) -> "Response":
-    """The response of the heading rate to its command, as law and rules are told it: identified, with its error.
+    """The response of the heading rate to its command, as used by law and gain rules: identified, with its error.
 
     Raises `IdentifiedError` where it is not known, FileNotFoundError for an unknown airframe.
     """

@@ -275,6 +275,6 @@ def _checked(flight: Flight) -> Flight:
     if target.track is not None:
         target = replace(target, track=str(target.track))
     flight = replace(flight, aircraft=str(flight.aircraft), target=target)
-    has_name = kind_of_class(type(flight.law)) is not None  # a law of one's own without a name checks itself
+    has_name = kind_of_class(type(flight.law)) is not None  # a user-defined law without a name checks itself
     flight_from_document(document(flight if has_name else replace(flight, law=laws.law("nftsm"))))
     return flight

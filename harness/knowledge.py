@@ -138,7 +138,7 @@ class Estimation:
 
 
 def losses(estimator: Estimator, seed: int) -> Callable[[float], bool]:
-    """Whether the next measurement, due at this time, s, is lost; to be asked of each in turn.
+    """Whether the next measurement, due at this time, s, is lost; to be called for each in turn.
 
     What is lost at random depends on `seed` and the number of the measurement alone.
     """

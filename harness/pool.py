@@ -81,7 +81,7 @@ def _begin(prepare: Callable[..., None] | None, *arguments: Any) -> None:
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed ends at once: nobody waits for its results."""
+    """A worker whose parent was killed ends immediately, since its results are not needed."""
     parent = multiprocessing.parent_process()
     assert parent
     parent.join()

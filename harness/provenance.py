@@ -104,7 +104,7 @@ def decides_bits() -> dict[str, str]:
 
 
 def decided_bits(run: Mapping[str, Any]) -> dict[str, str]:
-    """The same of an earlier run, as far as it was kept, from its `Provenance` as a row of the journal."""
+    """That environment of an earlier run, as far as it is stored, from its `Provenance` as a row of the journal."""
     return _decides_bits(run["processor"], run["python"], json.loads(run["packages"]))
 
 

@@ -60,7 +60,7 @@ class Requirement:
         return _EQUALITY[self.operator](fact, self.value)
 
     def distance(self, facts: Facts) -> float:
-        """How far the flight is from the border, over the value asked for: 0 or more when it is met, else 0 or less.
+        """The margin to the required value, over that value: 0 or more if it is met, otherwise 0 or less.
 
         1 or -1 of what is not a number; -inf of what is unknown and does not meet it.
         """

@@ -2,7 +2,7 @@
 
 import os
 
-_VARIABLES = (  # by which the libraries are told how many
+_VARIABLES = (  # that set the number of threads of the libraries
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
@@ -12,5 +12,5 @@ _VARIABLES = (  # by which the libraries are told how many
 
 
 def use_one_thread() -> None:
-    """For this process and those that it starts. Before NumPy is imported: a library asks once."""
+    """Sets one thread for this process and its children. To be called before NumPy is imported, which reads it once."""
     os.environ.update(dict.fromkeys(_VARIABLES, "1"))

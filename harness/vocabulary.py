@@ -11,7 +11,7 @@ class Verdict(StrEnum):
     HOLDS = "holds"
     HOLDS_IF = "holds if"  # the condition follows; without it the statement fails, or is undecided
     FAILS = "fails"
-    UNDECIDED = "undecided"  # the evidence does not tell
+    UNDECIDED = "undecided"  # the evidence does not decide
 
 
 SIGNS: Mapping[Verdict, str] = MappingProxyType(

@@ -96,7 +96,7 @@ def designed(linear: Linear, trim: Mapping[str, float], stall: float, max_bank: 
 
 
 def _fastest(linear: Linear, trim: Mapping[str, float], wanted: float) -> tuple[float, str]:
-    """The bank's bandwidth, rad/s, before the linear loop is asked, and what limits it."""
+    """The bandwidth of the bank loop, rad/s, before the linear loop is checked, and what limits it."""
     b = abs(float(linear.aileron.effect[_P]))
     if b < 1e-3:
         raise RefusalError("design", f"the aileron rolls the aircraft by {b:.2g} rad/s^2 only: use --controls")

@@ -14,7 +14,7 @@ from harness.cli._setting import SETTING
     "--set", "overrides", multiple=True, type=SETTING, metavar="KEY=VALUE", help="Override a setting; repeatable."
 )
 def check(file: Path, overrides: tuple[str, ...]) -> None:
-    """Check a settings file, or a law of your own, without flying it.
+    """Check a settings file, or a user-defined law, without flying it.
 
     Prints every mistake with its line, what is wrong and what is allowed; the warnings; and whether the circle can be
     held. Every flight of a matrix is checked. For a law, FILE.py or FILE.py:CLASS, it prints whether each command is

@@ -130,7 +130,7 @@ def log_of(flight: Flight, stream: Live | None = None) -> FlightLog:
 
 
 def _watched(flight: Flight, stream: Live | None) -> FlightLog:
-    """The flight of a law of one's own, which may hang: that ends it."""
+    """The flight of a user-defined law, which may hang: that ends it."""
     from harness.loop import simulate
     from harness.settings import tried
 

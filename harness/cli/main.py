@@ -33,7 +33,7 @@ COMMANDS: Mapping[str, Mapping[str, Entry]] = MappingProxyType(
     {
         "One flight": {
             "fly": Entry("fly:fly", "Fly one flight and print its metrics."),
-            "check": Entry("check:check", "Check a settings file, or a law of your own, without flying it."),
+            "check": Entry("check:check", "Check a settings file, or a user-defined law, without flying it."),
             "predict": Entry("predict:predict", "Predict the limit cycle of a flight without flying it."),
             "view": Entry("view:view", "Open flights in the Rerun viewer."),
             "plot": Entry("plot:plot", "Draw flights, or a map of a run, as a figure in print size."),

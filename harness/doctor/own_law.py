@@ -1,4 +1,4 @@
-"""The examination of a law of one's own: is it finite, limited, mirrored, the same each time, and without traces?"""
+"""The check of a user-defined law: finite, limited, mirrored, reproducible, and independent between flights."""
 
 import ast
 import math

@@ -76,7 +76,7 @@ class FlightLog:
       `target_velocity_east_variance`: of the estimate; `innovation_range`, `innovation_azimuth`: of the latest
       measurement since the row before, NaN without one.
 
-    - The channels of a law of one's own, named `law_NAME`; see the guide to a law of one's own.
+    - The channels of a user-defined law, named `law_NAME`; see the guide to a user-defined law.
 
     >>> log = harness.simulate(flight)
     >>> log["range_error"][-1], log.metrics["convergence_time_s"]

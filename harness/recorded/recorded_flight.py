@@ -198,7 +198,7 @@ class RecordedFlight:
     parameters: Mapping[str, float] = field(default_factory=dict)  # settings of the autopilot, where the log has them
     of_receipt: bool = False  # the times are those of receipt: they include telemetry latency
     refusals: tuple[str, ...] = ()  # why nothing may be judged from this log, a line each
-    vehicle: str = ""  # what the log says of the autopilot
+    vehicle: str = ""  # the autopilot, according to the log
 
     def __getitem__(self, name: str) -> Channel:
         """The channel. Raises KeyError, for a name that is none of `QUANTITIES` too."""

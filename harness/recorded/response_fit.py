@@ -81,7 +81,7 @@ def fitted(command: Channel, response: Channel, is_rate: bool = False) -> Respon
     time, y = response.time[inside], response.values[inside]
     if end - begin < 30.0 or len(time) < 4 * BLOCKS:
         return None
-    held = 0.5 * command.interval  # a command is seen half an interval late, on average
+    held = 0.5 * command.interval  # the delay of an observed command, on average
     step = max(_GRID, (end - begin) / _MOST_STEPS)
     grid = np.arange(begin, end + step, step)
     u = command.at(np.minimum(grid + held, command.time[-1]))

@@ -25,7 +25,7 @@ def lines(found: Assessment) -> Iterator[str]:
         yield f"The assumption {CANNOT}: {next(iter(parts))}."
         return
     if judged:
-        yield f"What the flight from {found.begin:.1f} to {found.end:.1f} s says of the assumption:"
+        yield f"The assumption in the flight from {found.begin:.1f} to {found.end:.1f} s:"
         yield ""
         yield from table(HEADINGS, map(row, judged), "llrrlrl")
         yield ""

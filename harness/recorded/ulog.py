@@ -189,7 +189,7 @@ def read_ulog(path: Path) -> RecordedFlight:
 
 
 class _Ordered(Mapping[str, Array]):
-    """The fields of a topic, each as numbers in the order of their times when it is asked for."""
+    """The fields of a topic, each as numbers in the order of their times, converted at its first use."""
 
     def __init__(self, fields: Mapping[str, Array], rows: NDArray[np.intp]) -> None:
         self._fields, self._rows = fields, rows

@@ -69,7 +69,7 @@ def read_logs(path: Path) -> dict[str, FlightLog]:
 
 
 def _flight(settings: Mapping[str, Any]) -> Flight:
-    """The recorded flight. A law of one's own is kept as its settings: no code is run that a file names."""
+    """The recorded flight. A user-defined law is kept as its settings: no code is run that a file names."""
     from harness.settings import flight_from_document
     from harness.settings.laws import NotRun, is_own
 

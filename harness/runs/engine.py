@@ -25,7 +25,7 @@ class Engine(NamedTuple):
     """The engine of a run."""
 
     compiled: bool  # where a flight can be compiled
-    notes: tuple[str, ...] = ()  # on the laws of one's own that Python flies
+    notes: tuple[str, ...] = ()  # on the user-defined laws that Python flies
 
 
 def engine_for(size: Survey, asked: str | None, times: float = 1.0) -> Engine:

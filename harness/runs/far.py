@@ -1,7 +1,7 @@
 """The code in a worker of a Dask cluster: it flies chunks of flights in a separate process.
 
-That process is the local pool with one worker, so a flight that hangs or ends its process is the same row as at home,
-and the Dask worker lives on.
+That process is the local pool with one worker, so a flight that hangs or ends its process gives the same row as on one
+machine, and the Dask worker lives on.
 """
 
 import hashlib
@@ -44,8 +44,8 @@ class FarFlight(NamedTuple):
 class Brief(NamedTuple):
     """The data common to all chunks of a run."""
 
-    versions: Mapping[str, str]  # at home: see `versions`
-    folder: Path  # of the run, at home
+    versions: Mapping[str, str]  # of the client: see `versions`
+    folder: Path  # of the run, on the client's machine
     timeout: float
 
 

@@ -62,7 +62,7 @@ def reading(folder: Path, *, thorough: bool = False) -> Iterator[sqlite3.Connect
         journal = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=WAIT)
         with closing(journal), closing(sqlite3.connect("")) as copy:
             journal.execute("PRAGMA query_only = ON")
-            journal.execute("PRAGMA trusted_schema = OFF")  # it may be somebody else's
+            journal.execute("PRAGMA trusted_schema = OFF")  # the file may come from another user
             version = format_of(journal, folder, thorough=thorough)
             if version != _FORMAT:
                 journal.backup(copy)

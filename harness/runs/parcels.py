@@ -37,7 +37,7 @@ class ParcelPlace(NamedTuple):
 
 
 class FileLaw(NamedTuple):
-    """A law of one's own from a file."""
+    """A user-defined law from a file."""
 
     at: ParcelPlace
     class_name: str

@@ -87,7 +87,7 @@ def recall(place: RowAddress) -> Recalled:
 
 
 def load_laws(folder: Path) -> None:
-    """Loads the laws of one's own that the rows name, but for those that have changed or are gone. `StoreError`."""
+    """Loads the user-defined laws that the rows name, but for those that have changed or are gone. `StoreError`."""
     with reading(folder) as journal:
         rows = journal.execute(
             "SELECT DISTINCT json_extract(f.settings, '$.law.name'), v.decides FROM flights f "
@@ -204,7 +204,7 @@ def _unpacked(folder: Path, files: Mapping[str, str], base: str = "files") -> Pa
     unpacked = Path(temporary) / base
     unpacked.mkdir()
     for name, digest in files.items():
-        (unpacked / Path(name).name).write_bytes(content(folder, digest))  # a name of somebody else leads nowhere else
+        (unpacked / Path(name).name).write_bytes(content(folder, digest))  # a foreign name leads nowhere else
     return unpacked
 
 

@@ -72,8 +72,8 @@ def simulate_safely(
 ) -> FlightLog:
     """Like `simulate`, but a flight that cannot start is an `invalid` log: one of many must not stop the others.
 
-    With `compiled` by a compiled loop where that can be: to the same bits. A worker may die of the model of somebody
-    else; another process may not.
+    With `compiled` by a compiled loop where possible, bit-identical. A third-party model may crash a worker, but no
+    other process.
 
     Raises MemoryError.
     """

@@ -2,7 +2,7 @@
 
 The square is a lattice. Its coarse points come first. Then, in every square of the coarse lattice on whose edges the
 answer changes: each change is halved until it lies between two neighbours; two points beside the middle of the line
-between two changes, one step off it, tell whether the border is that line; where it is another one, the square is
+between two changes, one step off it, test whether the border is that line; where it is another one, the square is
 divided into four. So a straight border costs few flights, a curved one more, and what enters a square through an edge
 is followed. What lies between the coarse points and touches no edge that was divided is missed.
 """

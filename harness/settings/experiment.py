@@ -81,7 +81,7 @@ def law_table(law: type[Law] | None, gains_given: bool) -> TableSchema:
         given = {**({"gains": gains} if gains else {}), **kind.numbers(gains), **given}
         try:
             return value(**{key: number for key, number in given.items() if key in parameters})
-        except Exception as error:  # a law of one's own may check itself
+        except Exception as error:  # a user-defined law may check itself
             raise PydanticCustomError(REFUSED, "{why}", {"why": str(error)}) from None
 
     keys = {key: replace(s, required=s.required and s.name not in of_sets) for key, s in own.items()}

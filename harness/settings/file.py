@@ -252,7 +252,7 @@ def _described(document: Mapping[str, object], folder: Path, *, run: bool) -> Ch
 
 
 def _table(document: Mapping[str, object], *, run: bool) -> tuple[TableSchema, list[Mistake]]:
-    """The schema of a document with its law, and what is wrong with a law of one's own."""
+    """The schema of a document with its law, and what is wrong with a user-defined law."""
     match document:
         case {"flight": {"law": {"name": str(name), **law}}} if name in LAWS or is_own(name):
             try:

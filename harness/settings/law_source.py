@@ -1,4 +1,4 @@
-"""Where a law of one's own is written: its file, and what that imports, found and read without running it."""
+"""Where a user-defined law is written: its file, and what that imports, found and read without running it."""
 
 import ast
 import sys
@@ -15,7 +15,7 @@ from harness.error import did_you_mean
 from harness.files import content_hash, read
 
 ENTRY_POINTS = "standoff_harness.laws"  # the group by which a package names its laws
-FILES = "law/"  # begins what a version calls the files of a law of one's own
+FILES = "law/"  # begins what a version calls the files of a user-defined law
 FORMS = "FILE.py:CLASS or MODULE:CLASS"
 _OTHERWISE = {"__name__", "TYPE_CHECKING"}  # in an `if`: what follows is not run when the file is imported
 _INSTALLED = ("site-packages", "dist-packages")
@@ -27,7 +27,7 @@ class LawError(ValueError):
 
 
 class Source(NamedTuple):
-    """Where a law of one's own is written: found without running it."""
+    """Where a user-defined law is written: found without running it."""
 
     name: str  # as settings keep it: the path of a file is absolute
     where: str  # the path of its file, or its module
@@ -54,7 +54,7 @@ def entries() -> Mapping[str, str]:
 
 
 def find(name: str) -> Source:
-    """The source of a law of one's own, found and read without running it. Raises `LawError`.
+    """The source of a user-defined law, found and read without running it. Raises `LawError`.
 
     It is read again when one of its files has another time or size; always while they are so young that a time tells
     too little.

@@ -1,6 +1,6 @@
 """The laws that settings may name: those of the package, and those of one's own, in a file or a module.
 
-A law of one's own is code. It is run where a user names it, never because a stored row or a recording does: a row's law
+A user-defined law is code. It is run where a user names it, never because a stored row or a recording does: a row's law
 is run from the user's own file alone, and only while that has the content that the row was flown with.
 """
 
@@ -24,7 +24,7 @@ from harness.settings.law_source import FILES, LawError, Source, entries, find
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnLaw:
-    """A law of one's own, loaded."""
+    """A user-defined law, loaded."""
 
     source: Source
     kind: LawKind
@@ -61,7 +61,7 @@ _BY_CLASS: dict[type, OwnLaw] = {}
 
 
 def kind_of(name: str, *, run: bool) -> LawKind:
-    """The law of this name. With `run` the file of a law of one's own may be run; without, it was before.
+    """The law of this name. With `run` the file of a user-defined law may be run; without, it was before.
 
     Raises `LawError`.
     """
@@ -87,13 +87,13 @@ def kind_of_class(law: type) -> tuple[str, LawKind] | None:
 
 
 def source_of(law: Law) -> Source | None:
-    """The source of a law of one's own, as this process has loaded it; None for those of the package."""
+    """The source of a user-defined law, as this process has loaded it; None for those of the package."""
     own = _BY_CLASS.get(type(law))
     return own.source if own else None
 
 
 def is_own(name: str) -> bool:
-    """Whether the name is one of a law of one's own."""
+    """Whether the name is one of a user-defined law."""
     return name not in LAWS and (":" in name or name.endswith(".py") or name in entries())
 
 
@@ -119,7 +119,7 @@ def absolute(name: str, folder: Path) -> str:
 def is_unchanged(settings: Mapping[str, Any], content: Mapping[str, str]) -> None:
     """Loads the law of a stored row if its file is here and as the row was flown, by the hashes of its `content`.
 
-    Raises `SettingsError` for any other law of one's own: it is not run.
+    Raises `SettingsError` for any other user-defined law: it is not run.
     """
     match settings:
         case {"law": {"name": str(name)}} if name not in LAWS:
@@ -138,7 +138,7 @@ def is_unchanged(settings: Mapping[str, Any], content: Mapping[str, str]) -> Non
 
 
 def _own(name: str) -> OwnLaw:
-    """The law of one's own, loaded once for each content of its files. Raises `LawError`."""
+    """The user-defined law, loaded once for each content of its files. Raises `LawError`."""
     source = find(name)
     key = name, tuple(source.hashes.values())
     if key not in _LOADED and source.is_module and name in _LATEST:
@@ -158,7 +158,7 @@ def parameters(law: Any) -> dict[str, Any]:
 
 
 def _reduced(law: Any) -> tuple[Any, ...]:
-    """How a law of one's own goes to a worker: by its name, since a file is no module there."""
+    """How a user-defined law goes to a worker: by its name, since a file is no module there."""
     return _restored, (_BY_CLASS[type(law)].source.name, parameters(law))
 
 

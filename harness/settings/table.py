@@ -42,7 +42,7 @@ class Setting:
 def _read(part: type) -> TableSchema:
     hints = get_type_hints(part, include_extras=True)
     settings = {}
-    shared = get_type_hints(StandoffLaw, include_extras=True)  # a law of one's own may write a plain `standoff: float`
+    shared = get_type_hints(StandoffLaw, include_extras=True)  # a user-defined law may write a plain `standoff: float`
     for f in fields(part):
         required = f.default is MISSING and f.default_factory is MISSING
         hint = shared.get(f.name, float) if hints[f.name] is float else hints[f.name]

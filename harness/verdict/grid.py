@@ -72,7 +72,7 @@ def grids(comparison: Comparison, metric: str) -> list[Grid]:
 def maps(
     entered: pd.DataFrame, axes: Mapping[str, Sequence[object]], metric: str, others: Sequence[str] = ()
 ) -> list[Grid]:
-    """The same of flights as they enter a comparison, and what varies in them; `others` are told apart as well."""
+    """The grid of flights as they enter a comparison, and the axes that vary; `others` are separated as well."""
     if metric not in METRICS:
         hint = did_you_mean(metric, METRICS)
         raise CompareError(f"no metric has the name {metric!r}{hint}; see `harness list metrics`")

@@ -88,7 +88,7 @@ class Pairs:
 def entered(flights: pd.DataFrame, circling: float) -> pd.DataFrame:
     """The flights as they enter a comparison, with the columns lost, converged and circles.
 
-    A flight that ended early has no metrics: it is counted as lost. A flight circles when it lasts, goes round its
+    A flight that ended early has no metrics: it is counted as lost. A flight circles when it lasts, moves around its
     target, and its settled error is below `circling` times the standoff distance.
     """
     table = flights.copy()
