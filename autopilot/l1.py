@@ -31,7 +31,7 @@ class L1(StandoffLaw):
     """ArduPilot's L1 loiter: on the circle the range error has second-order dynamics with this period and damping."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    period: Annotated[float, Ge(0.01), About("s: period of the path-following dynamics")]
+    period: Annotated[float, Ge(0.01), About("period of the path-following dynamics", "s")]
     damping: Annotated[float, Ge(0.01), Le(100), About("damping ratio of the path-following dynamics")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:

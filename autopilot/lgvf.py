@@ -30,7 +30,7 @@ class Lgvf(StandoffLaw):
     """Lyapunov guidance vector field: only the standoff distance shapes the field; k is the heading feedback."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    k: Annotated[float, Gt(0), About("1/s: feedback of the heading error")]
+    k: Annotated[float, Gt(0), About("feedback of the heading error", "1/s")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         return circling_step(self, steering(self))

@@ -35,9 +35,9 @@ class Nftsm(StandoffLaw):
     beta2: Annotated[float, Gt(0), Le(100), About("power of the fast term; Definition 5 requires at least 1")]
     beta3: Annotated[float, Gt(0), Lt(1), About("power of the terminal term")]
     eta: Annotated[float, Ge(1e-9), Le(1), About("|ell| below which the terminal term is smoothed")]
-    k1: Annotated[float, Gt(0), About("1/m: ell = arctan(k1 r)")]
-    k2: Annotated[float, Gt(0), About("1/s: linear reaching gain, Eq. (18)")]
-    k3: Annotated[float, Ge(0), About("1/s: power reaching gain, Eq. (18)")]
+    k1: Annotated[float, Gt(0), About("ell = arctan(k1 r)", "1/m")]
+    k2: Annotated[float, Gt(0), About("linear reaching gain, Eq. (18)", "1/s")]
+    k3: Annotated[float, Ge(0), About("power reaching gain, Eq. (18)", "1/s")]
     gamma1: Annotated[float, Gt(0), Lt(1), About("power of the reaching law, Eq. (18)")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:

@@ -36,9 +36,9 @@ class Npfg(StandoffLaw):
     """PX4's NPFG: the look-ahead angle depends on the track error; the period is bounded by the roll time constant."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    period: Annotated[float, Ge(0.01), About("s: period of the path-following dynamics")]
+    period: Annotated[float, Ge(0.01), About("period of the path-following dynamics", "s")]
     damping: Annotated[float, Ge(0.01), Le(100), About("damping ratio of the path-following dynamics")]
-    roll_time: Annotated[float, Ge(0), About("s: roll time constant, which bounds the period; 0: no bounds")]
+    roll_time: Annotated[float, Ge(0), About("roll time constant, which bounds the period; 0: no bounds", "s")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         return circling_step(self, steering(self))

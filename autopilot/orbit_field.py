@@ -34,7 +34,7 @@ class OrbitField(StandoffLaw):
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
     k_orbit: Annotated[float, Gt(0), About("orbit gain: atan(k_orbit r / R_d) is the course offset towards the orbit")]
-    k: Annotated[float, Gt(0), About("1/s: feedback of the course error")]
+    k: Annotated[float, Gt(0), About("feedback of the course error", "1/s")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         return circling_step(self, steering(self))

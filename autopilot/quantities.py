@@ -19,9 +19,13 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """The meaning of a field in one line, for `harness list` and the reference."""
+    """The meaning of a field in one line, for `harness list` and the reference.
+
+    `unit` is for a field without a `Unit`, whose number is the same in a file and inside.
+    """
 
     text: str
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)

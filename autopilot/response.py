@@ -32,14 +32,16 @@ class Response:
     """
 
     delay: Annotated[Seconds, Ge(0), Lt(10), About("transport delay")]
-    frequency: Annotated[float, Gt(0), About("rad/s: natural frequency of the bank mode")]
+    frequency: Annotated[float, Gt(0), About("natural frequency of the bank mode", "rad/s")]
     damping: Annotated[float, Gt(0), About("damping ratio of the bank mode")]
     lead: Annotated[Seconds, About("time constant of the zero: direct effects, such as the side force of a deflection")]
-    sideslip_frequency: Annotated[float, Gt(0), About("rad/s: natural frequency of the sideslip mode")]
+    sideslip_frequency: Annotated[float, Gt(0), About("natural frequency of the sideslip mode", "rad/s")]
     sideslip_damping: Annotated[float, Gt(0), About("damping ratio of the sideslip mode")]
-    zero_frequency: Annotated[float, Gt(0), About("rad/s: frequency of the zeros that nearly cancel the sideslip mode")]
+    zero_frequency: Annotated[
+        float, Gt(0), About("frequency of the zeros that nearly cancel the sideslip mode", "rad/s")
+    ]
     zero_damping: Annotated[float, About("damping ratio of those zeros")]
-    tail_rate: Annotated[float, Gt(0), About("1/s: pole of the slow tail")]
+    tail_rate: Annotated[float, Gt(0), About("pole of the slow tail", "1/s")]
     tail_share: Annotated[float, About("share of the slow tail in the response")]
 
     def matrices(self) -> tuple[Array, Array, Array]:

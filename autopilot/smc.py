@@ -23,10 +23,10 @@ class Smc(StandoffLaw):
     """SMC guidance. c2 in 1/m, c3 in rad/s, the rest in rad."""
 
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    c1: Annotated[float, Gt(0), About("rad: height of the manifold, Eq. (34)")]
-    c2: Annotated[float, Gt(0), About("1/m: steepness of the manifold, Eq. (34)")]
-    c3: Annotated[float, Gt(0), About("rad/s: reaching gain, Eq. (35)")]
-    epsilon: Annotated[float, Gt(0), About("rad: half width of the boundary layer, Eq. (35)")]
+    c1: Annotated[float, Gt(0), About("height of the manifold, Eq. (34)", "rad")]
+    c2: Annotated[float, Gt(0), About("steepness of the manifold, Eq. (34)", "1/m")]
+    c3: Annotated[float, Gt(0), About("reaching gain, Eq. (35)", "rad/s")]
+    epsilon: Annotated[float, Gt(0), About("half width of the boundary layer, Eq. (35)", "rad")]
 
     def start(self, context: Context = UNKNOWN) -> LawStep:
         return standoff_step(self, reaching(self))

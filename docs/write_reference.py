@@ -51,7 +51,9 @@ def pages() -> Mapping[str, str]:
 
 
 def _top() -> Iterator[str]:
-    rows = ([f"`{key}`", about(Experiment, setting.name)] for key, setting in schema_of(Experiment).settings.items())
+    rows = (
+        [f"`{key}`", about(Experiment, setting.name).text] for key, setting in schema_of(Experiment).settings.items()
+    )
     return markdown(["key", "meaning"], rows)
 
 

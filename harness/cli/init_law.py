@@ -22,8 +22,8 @@ class MyLaw(StandoffLaw):
     # The parameters: keys of [flight.law]. A plain `k: float = 0.5` will do; bounds are checked, a meaning is listed.
     # `standoff`, `max_heading_rate`, `direction`, `airspeed` and `command` come from StandoffLaw.
     gains: Annotated[str, About("the named set the gains started from")] = "custom"
-    lean: Annotated[float, Gt(0), About("1/m: how steeply the field leans towards the circle")] = 0.02
-    k: Annotated[float, Gt(0), About("1/s: feedback of the heading error")] = 0.5
+    lean: Annotated[float, Gt(0), About("slope of the field towards the circle", "1/m")] = 0.02
+    k: Annotated[float, Gt(0), About("feedback of the heading error", "1/s")] = 0.5
 
     # Named sets of the parameters, for `law.gains`; the first is the default. A law may have none.
     gain_sets: ClassVar = {"gentle": {"lean": 0.02, "k": 0.5}, "firm": {"lean": 0.02, "k": 2.0}}

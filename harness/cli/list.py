@@ -83,7 +83,7 @@ def _settings() -> Iterator[str]:
         yield part.name
         rows = []
         for one in keys_of(part):
-            choices = f": {', '.join(one.choices)}" if one.choices else ""
+            choices = f"; one of {', '.join(one.choices)}" if one.choices else ""
             rows.append([part.prefix + one.key, one.unit, one.default, one.meaning + choices])
         yield from table(["key", "unit", "default", "meaning"], rows)
 

@@ -1,7 +1,7 @@
 """The steady wind and the scale of the airspeed, fitted to a recorded track.
 
-At every time |ground velocity - wind| = scale * airspeed: three unknowns, observable by flying in many directions. What
-the autopilot estimated is held beside it, the right way round and the wrong way round.
+At every time |ground velocity - wind| = scale * airspeed: three unknowns, observable by flying in many directions. The
+autopilot's estimate is compared with it, with both signs.
 """
 
 import math

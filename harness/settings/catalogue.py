@@ -80,27 +80,32 @@ TABLES = (
 def keys_of(table: SettingsTable) -> Iterator[SettingsKey]:
     """The keys of a table, without tables that have an entry of their own."""
     if table.kind is StandoffLaw:
-        yield SettingsKey("name", "", REQUIRED, "", tuple(LAWS), "the guidance law; one of your own: FILE.py:CLASS")
+        yield SettingsKey("name", "", REQUIRED, "", tuple(LAWS), "the guidance law; a user-defined one: FILE.py:CLASS")
         sets = dict.fromkeys([*(gains for law in LAWS.values() for gains in law.sets), CUSTOM])
         defaults = ", ".join(f"{law.default} for {name}" for name, law in LAWS.items())
-        yield SettingsKey("gains", "", f"({defaults})", "", tuple(sets), "a named set of the law's gains")
+        yield SettingsKey("gains", "", "(of the law)", "", tuple(sets), f"a named set of gains; default: {defaults}")
     elsewhere = schema_of(table.inherited).settings if table.inherited else {}
     given = {field.name: field.default for field in fields(table.kind)}
     for key, setting in schema_of(table.kind).settings.items():
-        meaning = about(table.kind, setting.name)
+        meaning = about(table.kind, setting.name).text
         if key in elsewhere or key == "gains" or not meaning:  # a table without a meaning has an entry
             continue
         default = "(of the set)" if elsewhere else _default(setting, given[setting.name])
         choices = get_args(setting.kind) if get_origin(setting.kind) is Literal else ()
         yield SettingsKey(
-            key, UNITS[setting.unit.suffix], default, "" if choices else _allowed(setting), choices, meaning
+            key,
+            UNITS[setting.unit.suffix] or about(table.kind, setting.name).unit,
+            default,
+            "" if choices else _allowed(setting),
+            choices,
+            meaning,
         )
 
 
-def about(kind: type, name: str) -> str:
-    """A field's meaning, from its declaration."""
+def about(kind: type, name: str) -> About:
+    """A field's meaning, from its declaration; empty without one."""
     marks = get_args(get_type_hints(kind, include_extras=True)[name])
-    return next((mark.text for mark in marks if isinstance(mark, About)), "")
+    return next((mark for mark in marks if isinstance(mark, About)), About(""))
 
 
 def _default(setting: Setting, default: object) -> str:
