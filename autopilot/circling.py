@@ -13,9 +13,9 @@ from autopilot.guidance import Guidance, LawStep, Observation
 from autopilot.rules import Known, rounded
 from autopilot.standoff import STANDING, StandoffLaw, directed, limited, measured
 
-MARGIN = 1.5  # PX4's NPFG_PERIOD_SF: what the period is longer than the least stable one
+MARGIN = 1.5  # PX4's NPFG_PERIOD_SF: factor of the period over the least stable one
 _CLOSEST = 1e-6  # m: as in `standoff.relative_motion`
-_LEAST_COSINE = 0.1  # of the angle between course and heading
+_LEAST_COSINE = 0.1  # least cosine of the angle between course and heading for course control
 
 
 class Circling(NamedTuple):

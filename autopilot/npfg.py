@@ -25,9 +25,9 @@ GAIN_SETS = MappingProxyType(
     {"published": {"period": 10.0, "damping": 0.7, "roll_time": 0.5}}
 )
 
-_BUFFER = 1.5  # m/s: within it a bearing becomes infeasible
+_BUFFER = 1.5  # m/s: range of airspeed over which a bearing becomes infeasible
 _SLOWEST = 1.0  # m/s: the speed below which the track error bound no longer shrinks in proportion
-_SMALLEST_RADIUS = 0.5  # m
+_SMALLEST_RADIUS = 0.5  # m: least distance to the centre in the feed-forward
 _NO_AIR = 1e-6
 
 

@@ -18,7 +18,7 @@ from harness.world.target import Target
 from harness.world.track import TrackError, load_track
 from harness.world.wind import HIGHEST, LOWEST
 
-_START_WITHIN = 15.0  # s, of what takes some milliseconds
+_START_WITHIN = 15.0  # s: time limit of the trial of a start, which takes milliseconds
 MOST_PERIODS = 4_000_000  # guidance periods of a flight: its log then takes 2 GB
 MOST_STEPS = 40_000_000  # steps of a flight: its gusts then take 2 GB
 

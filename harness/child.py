@@ -24,7 +24,7 @@ from harness.error import HarnessError
 from harness.spawn import SPAWN
 from harness.threads import use_one_thread
 
-SECONDS = 60.0  # on the clock
+SECONDS = 60.0  # wall time of a call
 MEMORY = 2 << 30  # bytes more than the process has when the function is called
 
 Given = ParamSpec("Given")
@@ -178,7 +178,7 @@ def _awaited(answers: Connection, calls: Connection, seconds: float) -> tuple[bo
 
 # In the child
 
-_TELL_EVERY = 0.5  # s
+_TELL_EVERY = 0.5  # s between progress reports
 _NOTHING = (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)  # no file has room for a byte, and nothing dumps a core
 _told: dict[str, Any] = {}  # where to answer, the limit in s, and the time of the last progress report
 

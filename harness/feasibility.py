@@ -13,8 +13,8 @@ from harness.world.target import TargetState
 
 Array = NDArray[np.float64]
 
-_POINTS = 72  # on the circle
-_AT_ONCE = 1000  # rows
+_POINTS = 72  # points on the circle
+_AT_ONCE = 1000  # rows computed at once
 
 
 def target_states(flight: Flight) -> list[TargetState]:

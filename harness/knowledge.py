@@ -15,7 +15,7 @@ from harness.world.randomness import stream
 from harness.world.target import Target, TargetState
 
 NO_MEASUREMENT = Measurement(math.nan, math.nan)
-_AHEAD = 1000  # guidance steps
+_AHEAD = 1000  # guidance steps that the filter works ahead
 
 
 class Instruments:

@@ -40,16 +40,16 @@ from harness.plants.turn import GRAVITY
 from harness.plants.wind_tunnel import POUND, STEADY, Controls, NotFiniteError, TrimPoint, WindTunnel
 from harness.tables import counted
 
-SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0, 2.8)  # times that of the lift coefficient below
+SPEEDS = (1.0, 1.2, 0.85, 1.5, 0.7, 2.0, 2.8)  # trim airspeeds to try, over that of the lift coefficient below
 LIFT_COEFFICIENT = 0.5
-SECONDS = 60.0  # that all stages together may take
-LOADING = 20.0  # s, that its load may take
-_SLOWEST = 2e-4  # s of computing for a step: all stages together need some 150 000
+SECONDS = 60.0  # s: time limit of all stages together
+LOADING = 20.0  # s: time limit of the load
+_SLOWEST = 2e-4  # s: largest computing time of a step; all stages together need about 150 000
 _STEPS_TIMED = 50
 _THROTTLES = (0.15, 0.4, 0.65, 0.9)
-_MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # of a command in trim
+_MOST = {"elevator": 0.7, "throttle": 0.93, "aileron": 0.7, "rudder": 0.7}  # largest share of a command in trim
 
-_IN_TRIM = ("linearise", "design", "90 deg", "circle")  # stages that another trim may pass
+_IN_TRIM = ("linearise", "design", "90 deg", "circle")  # stages that may succeed with another trim airspeed
 
 _AXES = (
     "{:.2g} m/s^2 forwards", "{:.2g} m/s^2 sidewards", "{:.2g} m/s^2 downwards",

@@ -19,7 +19,7 @@ from harness.plants.identified import Identified, document
 from harness.plants.plant import Start
 from harness.plants.wind_tunnel import Controls, TrimPoint
 
-STEP = 0.005  # s, of all that is flown here
+STEP = 0.005  # s: simulation step
 STANDARD = Controls("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm", ("fcs/throttle-cmd-norm",))
 _NO_GAINS = dict.fromkeys(ADOPTED_GAINS, 0.0)
 _TEMPLATE = "inner_loop.xml.jinja"

@@ -19,17 +19,17 @@ Array = NDArray[np.float64]
 
 ZETA = 0.8
 LEAST_DAMPING = 0.28
-_GROWING = 0.02  # 1/s: what grows more slowly, guidance holds
-_AILERON, _RUDDER = 0.95, 0.8  # of what the trim leaves: the limits of the inner loop
-_IN_TURN = 0.8  # of these limits, that a steady turn may take
-_LEAST_BANK, _SIDESLIP = math.radians(10.0), math.radians(4.0)  # in turns
-_STEP = math.radians(45.0)  # of the bank, that the whole aileron may answer
-_WOBBLE = math.radians(1.0)  # of the bank, that hysteresis may leave
+_GROWING = 0.02  # 1/s: slower divergence is stabilised by guidance
+_AILERON, _RUDDER = 0.95, 0.8  # shares of the travel left by the trim: limits of the inner loop
+_IN_TURN = 0.8  # largest share of these limits in a steady turn
+_LEAST_BANK, _SIDESLIP = math.radians(10.0), math.radians(4.0)  # rad: least bank and largest sideslip of a turn
+_STEP = math.radians(45.0)  # rad: step of the bank that may use the whole aileron
+_WOBBLE = math.radians(1.0)  # rad: largest oscillation of the bank by hysteresis
 ADOPTED_GAINS = (  # beside those of the inner loop itself
     "aileron-in-turn", "aileron-from-sideslip", "bank-i", "bank-model-per-s",
     "rudder-in-turn", "rudder-from-roll-rate", "sideslip-i", "sideslip-limit",
 )  # fmt: skip
-_NO_RUDDER = 1e-3  # rad/s^2 of its whole travel
+_NO_RUDDER = 1e-3  # rad/s^2 over the whole travel: a rudder with less effect counts as none
 _P, _Q, _R, _W, _U = 3, 4, 5, 2, 0
 
 

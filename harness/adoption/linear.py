@@ -15,7 +15,7 @@ Eigenvalues = NDArray[np.complex128]
 
 COMMANDS = ("elevator", "aileron", "rudder", "throttle")
 _U, _V, _W, _P, _Q, _R = range(6)
-_LITTLE = 1e-3  # rad/s^2 of the whole travel: nothing
+_LITTLE = 1e-3  # rad/s^2 over the whole travel: a smaller effect counts as none
 _ANGLE, _RATE, _SPEED, _COMMAND = math.radians(0.5), math.radians(1.0), 0.01, 0.05
 
 

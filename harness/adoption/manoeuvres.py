@@ -24,9 +24,9 @@ from harness.world.wind import Wind
 
 Array = NDArray[np.float64]
 
-PERIOD = 0.05  # s, of the commands
-CIRCLING_SHARE = 0.35  # of the tangent of the largest bank, on the circle
-COMMANDED_SHARE = 0.85  # of that tangent: the limit of the law's command
+PERIOD = 0.05  # s: guidance period
+CIRCLING_SHARE = 0.35  # tangent of the bank on the circle, over that of the largest bank
+COMMANDED_SHARE = 0.85  # tangent of the bank at the command limit, over that of the largest bank
 _SIDESLIP = math.radians(6.0)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from harness.runs.run import Options, Progress
     from harness.runs.survey import Survey
 
-_MOST_LINES = 60  # of the table of results
+_MOST_LINES = 60  # largest number of lines of the table of results
 _MOST_REASONS = 5
 _MOST_WARNINGS = 10
 

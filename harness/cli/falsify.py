@@ -10,7 +10,7 @@ import click
 if TYPE_CHECKING:
     from harness.search.falsify import Falsification
 
-_MOST_LINES = 5  # of the table of the worst
+_MOST_LINES = 5  # largest number of lines of the table of the worst
 
 
 @click.command()

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from harness.requirement import Requirement
     from harness.search.tune import Tuning
 
-_MOST_LINES = 30  # of a front
+_MOST_LINES = 30  # largest number of lines of a front
 
 
 @click.command()

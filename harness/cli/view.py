@@ -12,7 +12,7 @@ from harness.cli._paths import PATH, PATH_OR_ROW
 if TYPE_CHECKING:
     from harness.log import FlightLog
 
-_MOST_OFFERED = 20  # flights, where none is chosen
+_MOST_OFFERED = 20  # largest number of flights listed when none is chosen
 
 
 @click.command()

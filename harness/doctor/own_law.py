@@ -19,8 +19,8 @@ from harness.plants.plant import End
 from harness.settings import document, flight_from_document
 from harness.settings.tried import SLOW, TRIED_WITHIN, answers, cost, observations, within
 
-_SEEN, _FEW = 200, 60  # observations
-_SAME = 1e-9  # rad/s
+_SEEN, _FEW = 200, 60  # numbers of observations of a check
+_SAME = 1e-9  # rad/s: tolerance of equal commands
 
 
 class Found(NamedTuple):

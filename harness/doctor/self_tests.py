@@ -15,7 +15,7 @@ from harness.plants.plant import Start
 from harness.plants.sixdof import SixDof, trim
 from harness.world.air import Air
 
-WIND_TOLERANCE = 1e-6  # m/s
+WIND_TOLERANCE = 1e-6  # m/s: tolerance of the wind in JSBSim
 UNIT_TOLERANCE = 1e-4  # relative: JSBSim rounds its factor for kg m^2
 
 

@@ -17,8 +17,8 @@ from harness.settings import flight_from_document
 
 STORED = Path(__file__).with_suffix(".json")
 UNITS = {"north": "m", "east": "m", "altitude": "m", "heading": "rad", "airspeed": "m/s", "range_error": "m"}
-EVERY = 10.0  # s: so far apart are the rows whose numbers are stored
-TOLERANCE = 1e-5  # SI, and relative beyond 1: as far may rounding move a flight, and no further
+EVERY = 10.0  # s: time between the rows whose numbers are stored
+TOLERANCE = 1e-5  # SI, relative beyond 1: largest deviation of a flight by rounding
 
 
 class StoredFlight(NamedTuple):

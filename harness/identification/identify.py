@@ -33,7 +33,7 @@ from harness.series import rms
 from harness.world.air import Air
 
 _BANK = State._fields.index("bank")
-_SMALL_LAG = 0.28  # s, to 63 % of a step: of the small aircraft that the fit was made for
+_SMALL_LAG = 0.28  # s: time to 63 % of a step of the small aircraft for which the fit was designed
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,12 +18,12 @@ from harness.world.randomness import stream
 
 Array = NDArray[np.float64]
 
-STEP = 0.005  # s, of the simulation and of every command here
-SLOWEST, FASTEST = 0.05, 20.0  # rad/s, of the sweep
+STEP = 0.005  # s: step of the simulation and of every command here
+SLOWEST, FASTEST = 0.05, 20.0  # rad/s: range of the sweep
 SWEEP_PERIOD = 2.0 * math.pi / SLOWEST  # s
 SWEPT = MappingProxyType({"small": 0.5, "medium": 2.0, "large": 4.0})  # deg/s rms
 STEPS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0)
-STEP_LENGTH = 10.0  # s, of each step
+STEP_LENGTH = 10.0  # s: length of each step
 
 
 def held(levels_deg_s: Sequence[float], each: float) -> Array:

@@ -8,7 +8,7 @@ from harness.identification.identify import Identification
 from harness.identification.manoeuvres import STEP
 from harness.tables import table
 
-BOUND = 0.05  # of the command, RMS: manoeuvres with a larger error are named
+BOUND = 0.05  # rms error over the command, above which manoeuvres are listed
 
 _POINTS_RAD_S = (0.3, 1.0, 3.0, 10.0)
 

@@ -26,11 +26,11 @@ from harness.plants.plant import Outcome
 Array = NDArray[np.float64]
 Flights = Mapping[str, FlightLog]  # by the names that the legend gives them
 
-MOST = len(COLOURS)  # flights in one figure
+MOST = len(COLOURS)  # largest number of flights in one figure
 _WIDE, _THIN = 2.0, 0.9  # points: the first flight lies under the others, so it is wider
-_LETTERS, _BESIDE_LETTERS = 18.0, 5  # of a legend: per inch, and as wide as so many is the rest of an entry
-_MOST_BY_ALL = 2  # flights that have all panels unless some are chosen: more would hide each other
-_LEAST_ERROR = 1e-6  # m: what is smaller is rounding
+_LETTERS, _BESIDE_LETTERS = 18.0, 5  # letters of a legend per inch; width of an entry's line sample, in letters
+_MOST_BY_ALL = 2  # largest number of flights with all panels by default: more would hide each other
+_LEAST_ERROR = 1e-6  # m: smaller errors are rounding
 
 
 def picture(flights: Flights, panels: Sequence[str] = ()) -> Picture:

@@ -20,8 +20,8 @@ SETTLED_FOR = 5.0  # s: shortest remaining flight after convergence
 LEAST_PACE = (
     0.1  # least mean angular rate over v_a / R_d, its value in still air: exceeded everywhere up to w = 0.9 v_a
 )
-AVERAGED_OVER = 0.25  # s
-LONGEST_LAG = 2.0  # s
+AVERAGED_OVER = 0.25  # s: averaging time of the heading-rate error, and time over which a command must change
+LONGEST_LAG = 2.0  # s: largest lag that is searched
 LEAST_EXCITATION = np.radians(0.5)  # rad/s: least standard deviation of a command, or turn, for a lag or ratio
 AS_WELL = 0.9  # a smaller delay is preferred if it explains this share of what the best delay explains
 LEAST_EXPLAINED = 0.5  # least share of the flown rate's variance explained by the command for a lag

@@ -16,7 +16,7 @@ from harness.plants.plant import Flying, Start
 from harness.plants.turn import GRAVITY, bank_of_turn
 from harness.world.air import Air
 
-_NODES = 3  # of the collocation in a piece of at most 50 ms
+_NODES = 3  # nodes of the collocation in a piece of at most 50 ms
 _GAUSS_NODES, _WEIGHTS_TO_END, _WEIGHTS_TO_NODES = gauss(_NODES)
 _WEIGHTS = tuple(float(weight) for weight in _WEIGHTS_TO_END)
 _TO_NODES = tuple(tuple(float(weight) for weight in row) for row in _WEIGHTS_TO_NODES)

@@ -10,7 +10,7 @@ from harness.plants.level import InPieces, Level, Motion, MovingInPieces, States
 from harness.plants.plant import Flying, Start
 from harness.world.air import Air
 
-_NODES = 4  # of the quadrature of the position in a piece of at most 50 ms
+_NODES = 4  # nodes of the quadrature of the position in a piece of at most 50 ms
 _WEIGHTS = tuple(float(weight) for weight in gauss(_NODES)[1])
 
 

@@ -36,7 +36,7 @@ class NoTrimError(ValueError):
     """There is no steady level flight at this airspeed."""
 
 
-_NUDGE = 1e-5  # rad, or of the throttle
+_NUDGE = 1e-5  # rad, or share of the throttle: step of numerical derivatives
 
 
 class Trim(NamedTuple):

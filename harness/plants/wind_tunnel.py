@@ -31,10 +31,10 @@ _UNITS = np.array([FT, FT, FT, 1.0, 1.0, 1.0])
 _CLEAN = ("gear/gear-cmd-norm", "gear/gear-pos-norm", "fcs/flap-cmd-norm", "fcs/speedbrake-cmd-norm",
     "fcs/spoiler-cmd-norm", "fcs/left-brake-cmd-norm", "fcs/right-brake-cmd-norm", "fcs/center-brake-cmd-norm",
 )  # fmt: skip
-STEADY = 2e-3  # m/s^2 and rad/s^2: what is left of the accelerations in a trim
-_STARTER = 5.0  # s
-_NO_RUDDER = 0.01  # rad/s^2 of its whole travel
-_ASIDE, _ASIDE_FOR = 0.2, 0.3  # of the commands, and s
+STEADY = 2e-3  # m/s^2 and rad/s^2: residual accelerations of a trim
+_STARTER = 5.0  # s: time of the starter
+_NO_RUDDER = 0.01  # rad/s^2 over the whole travel: a rudder with less effect counts as none
+_ASIDE, _ASIDE_FOR = 0.2, 0.3  # offset of the commands, and its duration, s, for the approach from one side
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,9 @@ from harness.recorded.recorded_flight import Array, Basis, Channel, LogError, Re
 from harness.recorded.turn import STEEPEST
 from harness.world.air import Air
 
-PERIOD = 0.05  # s, of a command
-_STEP = 0.005  # s, of the simulation
-_ALTITUDE = 150.0  # m
+PERIOD = 0.05  # s: guidance period
+_STEP = 0.005  # s: simulation step
+_ALTITUDE = 150.0  # m: altitude of the simulated flight
 _ASSUMED = (
     "bank",
     "yaw",

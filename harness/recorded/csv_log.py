@@ -13,8 +13,8 @@ from harness.recorded.draft import Draft
 from harness.recorded.recorded_flight import Array, LogError, LoggedEvent, RecordedFlight
 from harness.recorded.thinning import every, said
 
-_ROWS = 50_000  # at once
-_LONGEST_HEADER = 1_000_000  # characters
+_ROWS = 50_000  # rows read at once
+_LONGEST_HEADER = 1_000_000  # largest number of characters of a header
 
 
 def read_csv(paths: Sequence[Path], map_name: str | None) -> RecordedFlight:

@@ -18,7 +18,7 @@ from harness.recorded.recorded_flight import Array, Basis, LogError, LoggedEvent
 MAGIC = b"\xa3\x95"  # before every message; the type follows
 _FMT = 128  # the type of the message that describes another
 _FMT_LENGTH = 89
-_PIECE = 1 << 24  # bytes: so much of the mapped file is in memory at once
+_PIECE = 1 << 24  # bytes of the mapped file in memory at once
 
 # Each letter of a format: NumPy's type, and the factor by which its whole numbers are multiplied.
 _LETTERS: Mapping[str, tuple[str, float]] = MappingProxyType(
@@ -30,7 +30,7 @@ _LETTERS: Mapping[str, tuple[str, float]] = MappingProxyType(
     }
 )  # fmt: skip
 _FIX = 3  # the least GPS.Status of a position in three dimensions
-_EARTH = 6_371_000.0  # m, radius
+_EARTH = 6_371_000.0  # m: radius of the Earth
 _DEGREES = ("d", "h", "D", "U", "k")  # units of FMTU that are degrees, or degrees a second
 
 

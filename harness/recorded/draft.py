@@ -18,9 +18,9 @@ from harness.recorded.recorded_flight import (
 )
 
 FASTEST = 100.0  # 1/s: rows that come faster are averaged, so that a long log takes no large memory
-LARGEST, LARGEST_TIME = 1e9, 1e11  # SI: a larger number is none
-WILD = 0.01  # of the rows: so few with a time far off are damaged; of more, the clock was set back
-LONGEST = 86_400.0  # s from the middle of a log: what is further away is damaged
+LARGEST, LARGEST_TIME = 1e9, 1e11  # SI: larger numbers are invalid
+WILD = 0.01  # share of rows with a time far off that count as damaged; with more, the clock was set back
+LONGEST = 86_400.0  # s: largest time from the middle of a log; times further away are damaged
 DISORDER = 1.0  # s: rows out of order by up to this are sorted; beyond it the clock was set back
 
 

@@ -12,7 +12,7 @@ from harness.recorded.recorded_flight import QUANTITIES, Array, RecordedFlight
 
 DEG = 180.0 / math.pi
 TURN = "turn relation"
-_SPAN = 0.4  # s
+_SPAN = 0.4  # s: span of the differences that give the rate of the yaw
 COMMANDED, FLOWN, OTHER = "commanded", "flown", "other"  # which line of a panel
 
 

@@ -16,15 +16,15 @@ MOST: Mapping[str, float] = MappingProxyType(
         "elevator": 1.6, "rudder": 1.6, "heading_rate_command": 2.0,
     }
 )  # fmt: skip
-_FASTEST_TURN = 6.0  # rad/s, of a direction
-_SHARE = 90.0  # percentile that is compared
+_FASTEST_TURN = 6.0  # rad/s: largest plausible rate of a direction
+_SHARE = 90.0  # percentile of a signal that is compared with its plausible range
 _SAID = "looks like degrees; the map gives its unit"
 _DEGREES = 180.0 / np.pi
-_BETWEEN = (0.3 * _DEGREES, 3.0 * _DEGREES)  # how much larger degrees are, with all that is not exact
-_SPAN = 0.4  # s
-_FEWEST = 8  # spans
-_SHORTEST = 1e-6  # s, between two values: less is a damaged time
-_ALIKE = 0.7  # correlation: an angle is compared with the rate that turns it
+_BETWEEN = (0.3 * _DEGREES, 3.0 * _DEGREES)  # ratios that indicate degrees instead of radians
+_SPAN = 0.4  # s: length of the spans in which angle and rate are compared
+_FEWEST = 8  # least number of spans
+_SHORTEST = 1e-6  # s: shortest time between two values; a shorter one is damaged
+_ALIKE = 0.7  # least correlation of an angle with its rate for a comparison of units
 _PAIRS = (("bank", "roll_rate"), ("pitch", "pitch_rate"))
 
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # sample once in HELD usual intervals, so that a constant signal has no gap.
 GAP = 8.0
 HELD = 3.0
-LARGEST = 1e9  # as of any setting: a larger number is a damaged one
+LARGEST = 1e9  # larger numbers are damaged, as in settings
 
 
 class LogError(HarnessError, OSError, ValueError):

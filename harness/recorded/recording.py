@@ -21,8 +21,8 @@ _BLUE: Colour = (125, 165, 215)
 _ORANGE: Colour = (255, 150, 40)
 _GREEN: Colour = (100, 215, 110)
 _LOOKS = {drawn.COMMANDED: (_BLUE, 1.0), drawn.FLOWN: (LIGHT, 1.5), drawn.OTHER: (_ORANGE, 1.0)}
-_SIZE = 100.0  # units of a chart's side
-_CROSS = 0.012  # of the width: half a mark
+_SIZE = 100.0  # side of a chart, units
+_CROSS = 0.012  # half the size of a mark, over the chart's width
 
 
 def write_recording_of(path: Path, whole: RecordedFlight, found: Assessment, command: str) -> None:

@@ -23,15 +23,15 @@ Array = NDArray[np.float64]
 BLOCKS = 20
 _GRID = 0.02  # s: the step of the response, unless that makes more than so many
 _MOST_STEPS = 500_000
-_SPAN = 4.0  # s: of an angle whose rate is commanded
-_TRANSIENT = 4.0  # s, at the beginning: what was commanded before the log is not known
+_SPAN = 4.0  # s: length of the spans whose mean is removed, for an angle whose rate is commanded
+_TRANSIENT = 4.0  # s: ignored at the beginning, since earlier commands are unknown
 _LOWEST = (-0.5, math.log(1.0), math.log(0.3), 0.2, -0.5)
 _HIGHEST = (3.0, math.log(40.0), math.log(4.0), 3.0, 0.5)
 _STARTS = ((0.05, 8.0, 1.0), (0.5, 5.0, 0.8), (1.2, 4.0, 1.0))  # the smallest delay first
 _USUAL = (0.1, math.log(7.0), math.log(1.0))  # prior means: delay, s, log of frequency, rad/s, log of damping
 _SPREAD = (0.2, 0.7, 0.4)
-_FIRM = 3.0  # times the noise: residuals of a simple model are alike for a while, and so count for less
-AS_WELL = 0.9  # of what the best delay explains: behind a periodic command one a period more explains as well
+_FIRM = 3.0  # factor on the noise of the prior: residuals are correlated, and so count for less
+AS_WELL = 0.9  # a smaller delay is preferred if it explains this share: a periodic command fits a period later as well
 DELAY, FREQUENCY, DAMPING, GAIN, LAG = range(5)
 
 

@@ -18,7 +18,7 @@ from harness.recorded.frames import bank_pitch_yaw
 from harness.recorded.recorded_flight import Array, Basis, LogError, LoggedEvent, RecordedFlight
 
 MAGIC = ULog.HEADER_BYTES
-_MOST_READ = 20  # times the file: pyulog goes back in a damaged file, and in some never stops
+_MOST_READ = 20  # largest number of bytes read over the file's size: pyulog may loop in a damaged file
 
 _Fields = Mapping[str, Array]
 

@@ -13,13 +13,13 @@ from harness.recorded.recorded_flight import Array, LogError, RecordedFlight
 
 JUDGED = ("roll_rate", "pitch_rate", "yaw_rate", "bank", "pitch", "yaw")
 RATES = JUDGED[:3]
-HORIZONS = (1.0, 2.0, 3.0)  # s
+HORIZONS = (1.0, 2.0, 3.0)  # s: lengths of the replays
 APART = 0.25  # s between two starts
-_FIT_APART = 0.5  # s: where offsets are fitted, a second from each start
-STEP = 0.005  # s
+_FIT_APART = 0.5  # s between two starts of the fit of offsets
+STEP = 0.005  # s: simulation step
 ALTITUDE = 100.0  # m: assumed, since a log gives only its own origin; density changes by 1 % in 100 m
 SLOWEST = 10.0  # 1/s: least update rate of the surfaces; slower logs miss changes
-LONGEST_DELAY = 0.15  # s
+LONGEST_DELAY = 0.15  # s: largest delay that is fitted
 LARGEST_OFFSET = math.radians(12.0)
 _NEEDED = (
     "aileron", "elevator", "throttle", "bank", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate", "velocity_north",

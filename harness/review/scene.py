@@ -17,8 +17,8 @@ from harness.review.styled import ESTIMATE, TARGET, WIND, Colour, StyledFlight, 
 
 Array = NDArray[np.float64]
 
-TRAIL = 60.0  # s
-_STRIP = 1.0  # s, of one piece of the trail
+TRAIL = 60.0  # s: length of the trail
+_STRIP = 1.0  # s: length of a piece of the trail
 _MOVES = 0.1  # s, between two poses
 _CORNERS = 0.25  # s, between two corners of a whole track
 _NEAR = 4.0  # how many times its size an aircraft has in the chase view

@@ -12,7 +12,7 @@ from harness.log import COLUMNS, FlightLog
 from harness.loop import Watch, simulate
 from harness.plants.plant import Outcome
 
-_STALLED = 15.0  # s without a row of the log
+_STALLED = 15.0  # s without a new row of the log, after which a flight has hung
 _MEMORY = 6 << 30  # bytes: the longest log has 2 GB, as the gusts of the longest flight
 
 

@@ -29,17 +29,17 @@ from harness.runs.row import failed_result
 from harness.runs.wall_time import WallTime
 from harness.runs.workers import Done, Task, WorkerResult, WorkersError
 
-CHUNK = 2.0  # s of flights in one message
-_SHORTEST_CHUNK = 0.3  # s
-_CHUNKS_EACH = 4  # that a worker gets at least, where there is enough to fly
-_MOST_TASKS = 1000  # in a chunk
+CHUNK = 2.0  # s: duration of the flights in one message
+_SHORTEST_CHUNK = 0.3  # s: least duration of the flights in one message
+_CHUNKS_EACH = 4  # least number of chunks per worker, if there are enough flights
+_MOST_TASKS = 1000  # largest number of flights in a chunk
 _AHEAD = 2  # chunks that are out per worker: one is flown, one waits
-_CONNECTING = 10.0  # s, until there is said to be no scheduler
-_WITHOUT_WORKERS = 30.0  # s, until it is said that there is none
-_LOOK_EVERY = 1.0  # s, for workers that came or went
-_POLL = 0.02  # s
+_CONNECTING = 10.0  # s: time limit of the connection to the scheduler
+_WITHOUT_WORKERS = 30.0  # s: time limit without any worker
+_LOOK_EVERY = 1.0  # s between two checks for workers that came or went
+_POLL = 0.02  # s between two checks for results
 _ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?(\[[0-9a-fA-F:]+\]|[\w.-]+):[0-9]{1,5}")
-_MOST_TOLD = 3  # workers that a message names
+_MOST_TOLD = 3  # largest number of workers named in a message
 
 
 class ClusterError(HarnessError):

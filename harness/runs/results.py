@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 PARQUET = "flights.parquet"
-_AT_ONCE = 1000  # rows
+_AT_ONCE = 1000  # rows read at once
 _TEXTS = ("key", "outcome", "reason", "digest")
 _NUMBERS = ("feasibility_margin_deg_s", "seconds")
 _NEEDED: Mapping[str, Collection[str]] = {  # what each flight has, and which there are, if that is known

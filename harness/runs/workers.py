@@ -34,12 +34,12 @@ from harness.settings.law_source import LawError
 from harness.spawn import SPAWN
 
 AHEAD = 2  # chunks sent out per worker: one is flown, one waits
-TIMEOUT = 60.0  # s of a worker's own time in which a flight gains no simulated time
-_ASIDE = 60.0  # s more before a flight's first row and after its last: start, metrics, recording
+TIMEOUT = 60.0  # s of process time without progress of the simulated time, after which a flight has hung
+_ASIDE = 60.0  # s: additional time before a flight's first row and after its last: start, metrics, recording
 _STALLED = 30.0  # s that all workers are blocked with no flight begun, after which they are replaced
-_LOOK_EVERY = 0.2  # s, at the workers
-_MOST_RESTARTS = 3  # of the workers, with no flight done in between
-_MOST_TASKS = 64  # in a chunk
+_LOOK_EVERY = 0.2  # s between two checks of the workers
+_MOST_RESTARTS = 3  # largest number of restarts of the workers without a finished flight
+_MOST_TASKS = 64  # largest number of flights in a chunk
 _PIPE = 48_000  # bytes of waiting messages: a full pipe blocks this process, for ever if all workers are dead
 OUT_OF_MEMORY = "the machine had too little memory for it"
 _NONE = -1  # no flight of the chunk has begun

@@ -33,7 +33,7 @@ from harness.settings.table import TableSchema, schema_of
 from harness.settings.toml_locator import Key, dotted, key_lines, nearest_line
 from harness.toml_text import shortened, tables_of, value_of
 
-_LARGEST = 1 << 24  # bytes
+_LARGEST = 1 << 24  # bytes: largest settings file
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,10 +24,10 @@ from harness.vocabulary import Verdict
 INK, GREY, UP, DOWN, BAND = "#1c2733", "#9aa5b1", "#c4501b", "#2a6f97", "#dfe8d8"
 COLOURS = {Verdict.HOLDS: "#2d6a3e", Verdict.FAILS: "#a4361c", Verdict.UNDECIDED: "#5b6876"}
 MARKERS = {Verdict.HOLDS: "o", Verdict.FAILS: "X", Verdict.UNDECIDED: "D"}
-MOST_CELLS = 40  # drawn for a part
+MOST_CELLS = 40  # largest number of cells drawn for a part
 SHADES, UNKNOWN, BORDER = "cividis", "#cccccc", "#D55E00"  # of maps, for colour-blind eyes too
 MOST_ACROSS, MOST_MAPS = 3, 12
-MOST_NUMBERS = 60  # cells of a map: no numbers stand in more
+MOST_NUMBERS = 60  # largest number of cells of a map with numbers
 
 
 def intervals(figure: Figure, card: Scorecard, parts: Sequence[Part]) -> None:

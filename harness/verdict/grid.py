@@ -13,10 +13,10 @@ from harness.verdict.comparison import Comparison
 from harness.verdict.pairs import CompareError, is_ordered, ordered, shown, spread
 
 DEFAULT = ("chatters", "range_error_rms_m")  # drawn by default
-ROUNDING = 1e-6  # of any metric: no map of rounding noise
+ROUNDING = 1e-6  # smaller ranges of a metric are rounding, and no map is drawn
 BEYOND = "*"  # marks a cell in which a limit cycle is predicted
 _MOST_GRIDS = 12
-_FLOWN = 0.25  # of a map's cells, at least: `harness map` and searches fly points that are on no grid
+_FLOWN = 0.25  # least share of a grid's cells that must be flown: points of maps and searches are on no grid
 
 
 @dataclass(frozen=True, slots=True)

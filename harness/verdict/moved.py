@@ -10,7 +10,7 @@ from harness.verdict.comparison import Comparison
 from harness.verdict.pairs import bundle, shown, spread
 
 MOST_LISTED = 8
-METRIC = "range_error_rms_m"  # by which flights are ranked
+METRIC = "range_error_rms_m"  # the metric by which flights are ranked
 
 
 class Moved(NamedTuple):

@@ -29,13 +29,13 @@ from harness.verdict.statistics import CONFIDENCE, LEAST_EQUAL, LEAST_SEEDS
 from harness.vocabulary import SIGNS
 
 SCRIPT = Path(__file__).with_name("report.js").read_text(encoding="utf-8")  # sorts and filters tables
-MOST_DRAWN = 6  # pairs of flights
+MOST_DRAWN = 6  # largest number of pairs of flights drawn
 MOST_CURVES = 12
 MOST_FLIGHTS = 60  # pairs listed
 MOST_GRIDS = 16
-MOST_LINES = 200  # of what was flown
-MOST_LADDERS = 12  # drawn: the page stays below 3 MB
-MOST_DISTURBED = 200  # rows
+MOST_LINES = 200  # largest number of combinations listed
+MOST_LADDERS = 12  # largest number of ladders drawn: the page stays below 3 MB
+MOST_DISTURBED = 200  # largest number of rows of disturbances
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,9 @@ from harness.error import HarnessError
 from harness.files import read
 
 HEADER = ("time_s", "north_m", "east_m")
-FEWEST = 4  # rows: as many as determine a cubic
-LARGEST = 1e9  # s or m
-SOONEST = 1e-6  # s from row to row: closer, the cubic has no finite coefficients
+FEWEST = 4  # least number of rows: a cubic is determined
+LARGEST = 1e9  # s or m: largest number in a track
+SOONEST = 1e-6  # s: least time between rows, for finite coefficients of the cubic
 
 _SLOWEST = 1e-6  # m/s: a slower target has no direction
 _Row = tuple[float, float, float]

@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from autopilot.quantities import About, MetresPerSecond, MetresPerSecondPerMetre, OneOf, Seconds
 from harness.world.air import Air, Array
 
-_SHARED = 1_000_000  # steps: longer air is not kept, since it takes hundreds of MB
+_SHARED = 1_000_000  # steps: longer air is not cached, since it takes hundreds of MB
 _Gusty = Annotated[MetresPerSecond, Ge(-100), Le(100)]
 
 
