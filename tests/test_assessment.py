@@ -303,7 +303,7 @@ def test_an_aircraft_that_only_heading_rates_tell_flies_on_lagged_alone(tmp_path
     assert invoke(*words, "--set", "plant=lagged").exit_code == 0
     refused = invoke(*words, "--set", "plant=coordinated")
     assert refused.exit_code == 2
-    assert "lagged does" in refused.output
+    assert "use lagged" in refused.output
 
 
 def test_a_log_too_short_to_judge_is_one_sentence_and_a_longer_one_a_table() -> None:

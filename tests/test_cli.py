@@ -295,7 +295,7 @@ def test_the_settings_are_listed_with_every_key_that_set_takes_each_with_default
     for name in ("law.c1", "target.segments.turn_rate_deg_s", "wind.gusts.to_s", "assess.sideslip_deg"):
         assert name in told
     assert re.fullmatch(r"start\.heading_deg +° +30\.0 +direction of the air velocity, .*", told["start.heading_deg"])
-    assert told["wind.turbulence"].endswith(": none, light, moderate, severe")
+    assert told["wind.turbulence"].endswith("; one of none, light, moderate, severe")
 
 
 def test_the_experiment_to_start_from_checks_and_runs_as_it_is_and_with_all_that_its_comments_offer(

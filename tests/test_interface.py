@@ -316,7 +316,7 @@ def test_a_picture_of_two_flights_names_both_and_shows_itself_in_a_notebook(log:
 
 
 def test_more_flights_than_colours_are_refused(log: harness.FlightLog) -> None:
-    with pytest.raises(ValueError, match="7 flights: up to 6"):
+    with pytest.raises(ValueError, match="7 flights: must be at most 6"):
         log.plot(*[log] * 6)
 
 
