@@ -10,8 +10,9 @@ import aircraft
 from autopilot.laws import law
 from autopilot.response import critical_gain, plain
 from harness.flight import Flight
+from harness.limit_cycle.cycle import limit_cycle
 from harness.limit_cycle.margin import ENOUGH, Following, following, gain_margin
-from harness.limit_cycle.prediction import Loop, crossover, limit_cycle
+from harness.limit_cycle.prediction import Loop, crossover
 from harness.log.metric import measure
 from harness.loop import simulate
 from harness.plants.identified import identified

@@ -166,6 +166,12 @@ def test_settings_that_come_too_near_to_the_limit_cycle_are_refused_before_they_
     assert not (out / "best.toml").exists()
 
 
+def test_a_margin_that_is_unknown_is_not_checked_and_that_is_said(file: Path, tmp_path: Path) -> None:
+    done = invoke("tune", file, "--out", tmp_path / "out", *OVER, *PEAK, "--flights", 8, "--workers", 0)
+    assert done.exit_code == 0, done.output
+    assert "warning: limit_cycle_margin was unknown in 4 of 4 trials and was not checked there\n" in done.stderr
+
+
 def test_an_infeasible_search_says_what_refused_how_many_trials(file: Path, tmp_path: Path) -> None:
     words = ("--subject-to", "range_error_peak_m < 1e-9", "--flights", 8, "--workers", 0)
     done = invoke("tune", file, "--out", tmp_path / "out", *OVER, *PEAK, *words)

@@ -80,7 +80,7 @@ def tune(
     be an axis of the [matrix]. The objective is the worst value of a metric over the conditions, or the worst distance
     from its ideal value. A constraint on every flight is NAME OP VALUE: a metric, the outcome, or a quantity that is
     predicted without a flight (limit_cycle_margin, feasibility_margin_deg_s, ...) against a value. By default the
-    outcome must be `completed` and limit_cycle_margin at least 1.5 (ignored where it cannot be predicted);
+    outcome must be `completed` and limit_cycle_margin at least 1.5 (where it can be predicted);
     --subject-to on either replaces its default. Settings that violate a predicted constraint are not flown.
 
     Prints the best settings, their results and the active constraints. Writes OUT/best.toml, which `harness fly`
@@ -136,6 +136,7 @@ def tune(
     except OSError as error:
         raise BadInput(f"{error.filename or out}: {error.strerror or error}") from None
     _print_found(search, best)
+    _warn_of_unchecked(search)
     print_endings(out)
     click.echo(
         f"{progress.done} flown, {progress.earlier} earlier, {progress.failed} failed; results in {out}, all trials in "
@@ -194,6 +195,15 @@ def _print_found(search: Tuning, files: Sequence[Path]) -> None:
         if reasons := list(search.constrained(attempt)):
             click.echo(f"{file.stem} is constrained by {' and '.join(reasons)}")
     click.echo(f"next: harness fly {files[0]}")
+
+
+def _warn_of_unchecked(search: Tuning) -> None:
+    from harness.tables import counted
+
+    for name, count in search.unchecked.items():
+        if count:
+            of = f"{count} of {counted(search.trials, 'trial')}"
+            click.echo(f"warning: {name} was unknown in {of} and was not checked there", err=True)
 
 
 def _front(search: Tuning) -> tuple[list[str], list[list[str]], str]:

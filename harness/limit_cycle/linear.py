@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.linear import Array, Linear
-from autopilot.response import held
+from autopilot.linear import Linear
 from harness.chatter import VISIBLE
+from harness.limit_cycle.march import matrices
 from harness.limit_cycle.prediction import Crossover, LawFailed, Loop
 
 NO_LINEARISATION = "the law has memory, and no method `linearised` that says what it does to a small oscillation"
 _TRIED = 7  # points at which a law is asked twice
+_UNSTABLE = 1.0 + 1e-9  # times a period: a free range error, which no law corrects, stays as it is but for rounding
 
 
 def linearised(loop: Loop) -> Linear | None:
@@ -37,8 +38,8 @@ def crossing_and_margin(loop: Loop, law: Linear) -> tuple[Crossover | None, floa
     """Crossover and margin of the loop with a law that gives this linearisation.
 
     A gain can be the border only where the loop, opened at the command, has the phase of a sustained oscillation; of
-    those the margin is the next above 1 of a stable loop, and below 1 that of an unstable one: inf and NaN where there
-    is none.
+    those the margin is the next above 1 of a stable loop, and below 1 that of an unstable one: inf and 0 where there is
+    none, as an unstable loop is then unstable with less gain, too.
     """
     omega = math.pi / loop.period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
     z = np.exp(1j * omega * loop.period)
@@ -62,32 +63,12 @@ def crossing_and_margin(loop: Loop, law: Linear) -> tuple[Crossover | None, floa
     for lower, border in reversed(list(pairwise(below))):
         if _is_stable(loop, law, 0.5 * (lower + border)):
             return crossover, float(border)
-    return crossover, math.nan
+    return crossover, 0.0
 
 
 def _is_stable(loop: Loop, law: Linear, times: float) -> bool:
-    """Whether the closed loop is, with so many times the gain of the law."""
-    F, g, H = _aircraft(loop)
-    D = times * loop.gain * law.D @ H
-    closed = np.block([[F + g * D, g * (times * loop.gain * law.C)], [law.B @ H, law.A]])
-    return bool(np.abs(np.linalg.eigvals(closed)).max() < 1.0)
-
-
-def _aircraft(loop: Loop) -> tuple[Array, Array, Array]:
-    """The sampled response as matrices: of the states, of the command, and from the states to (heading, range) error.
-
-    The states are those of `held`, then the commands that still wait, latest first.
-    """
-    periods, step, now, earlier = held(loop.response, loop.period)
-    n = len(step)
-    m = n + periods + 1
-    F, g, H = np.zeros((m, m)), np.zeros((m, 1)), np.zeros((2, m))
-    F[:n, :n], F[:n, -1] = step, earlier
-    if periods:
-        F[:n, -2] = now
-    else:
-        g[:n, 0] = now
-    g[n, 0] = 1.0
-    F[range(n + 1, m), range(n, m - 1)] = 1.0
-    H[0, n - 2], H[1, n - 1] = 1.0, loop.airspeed
-    return F, g, H
+    """Whether the closed loop does not diverge, with so many times the gain of the law."""
+    F, g, H = matrices(loop)
+    D, C = times * loop.gain * law.D @ H, times * loop.gain * law.C
+    closed = np.block([[F + np.outer(g, D), np.outer(g, C)], [law.B @ H, law.A]])
+    return bool(np.abs(np.linalg.eigvals(closed)).max() < _UNSTABLE)

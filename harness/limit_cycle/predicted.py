@@ -37,13 +37,13 @@ PREDICTED: Mapping[str, Callable[[Following], float | None]] = MappingProxyType(
 
 
 def predicted(flight: Flight, names: Collection[str] = tuple(PREDICTED)) -> dict[str, float | None]:
-    """The numbers of `PREDICTED` with these names. All are None where `why_unknown` has a reason.
+    """The numbers of `PREDICTED` with these names; None where unknown, and of a limit cycle where there is none.
 
     Without those of the limit cycle it takes a quarter of the time.
     """
     reason = _why_not(flight)
     found = Following(reason=reason) if reason else following(flight, cycle=not _OF_CYCLE.isdisjoint(names))
-    return {name: None if found.reason else PREDICTED[name](found) for name in names}
+    return {name: PREDICTED[name](found) for name in names}
 
 
 def predicted_margin(flight: Flight) -> float | None:
@@ -52,12 +52,12 @@ def predicted_margin(flight: Flight) -> float | None:
 
 
 def why_unknown(flight: Flight) -> str:
-    """Why nothing is predicted of the flight; empty when it is."""
-    return _why_not(flight) or following(flight).reason
+    """Why the margin to the limit cycle is unknown; empty where it is known."""
+    return _why_not(flight) or following(flight, cycle=False).reason
 
 
 def unforeseen(flight: Flight) -> str:
-    """Which error of the flight a prediction leaves out; empty when it leaves out none."""
+    """The active error of the flight that the prediction does not model, in a sentence; empty where there is none."""
     misled = flight.errors.response_speed != 1.0 and uses_response(flight.law)
     left_out = [*flight.errors.of_loop, *(["response_speed"] if misled else [])]
     return f"the prediction does not know of errors.{left_out[0]}" if left_out else ""

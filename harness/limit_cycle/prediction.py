@@ -13,7 +13,7 @@ with more it converges to the cycle of the sampled loop. The law is called as in
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -74,12 +74,25 @@ class Loop:
         """The heading rate on the circle in still air, in the paper's direction, rad/s."""
         return -self.airspeed / self.law.standoff
 
+    @property
+    def holds_circle(self) -> bool:
+        """Whether the heading-rate limit allows the heading rate of the circle."""
+        return self.law.max_heading_rate > abs(self.turn)
+
     def commands(self, e: Array, r: Array) -> Array:
         """The commands of the law, rad/s, at these heading errors, rad, and range errors, m; equal shapes.
 
         Raises `LawFailed`.
         """
-        R_d, v_a = self.law.standoff, self.airspeed
+        command = self.started()
+        return np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)], np.float64)
+
+    def started(self) -> Callable[[float, float], float]:
+        """The law in flight: its command, rad/s, at a heading error, rad, and a range error, m.
+
+        Both raise `LawFailed`.
+        """
+        R_d, v_a, limit = self.law.standoff, self.airspeed, self.law.max_heading_rate
 
         def seen(e: float, r: float) -> Observation:
             psi = e - 0.5 * math.pi  # due north of the target, at the origin, the paper's circle goes west
@@ -87,20 +100,24 @@ class Loop:
             return Observation._make((*own, *(0.0,) * 9))
 
         def command(e: float, r: float) -> float:
-            guidance = step(seen(e, r))
-            if self.gain == 1.0:
-                return float(guidance.heading_rate)
-            wanted = self.turn + self.gain * (guidance.unlimited_command - self.turn)
-            return float(np.clip(wanted, -self.law.max_heading_rate, self.law.max_heading_rate))
+            try:
+                guidance = step(seen(e, r))
+                if self.gain == 1.0:
+                    answer = float(guidance.heading_rate)
+                else:
+                    wanted = self.turn + self.gain * (guidance.unlimited_command - self.turn)
+                    answer = float(min(max(wanted, -limit), limit))
+            except (Exception, SystemExit) as error:
+                raise LawFailed(f"the law raised {type(error).__name__}: {error}") from error
+            if not math.isfinite(answer):
+                raise LawFailed("the law commanded what is not finite")
+            return answer
 
         try:
             step = self._in_the_papers_direction(seen(0.0, 0.0))
-            commands = np.array([command(*both) for both in zip(e.tolist(), r.tolist(), strict=True)], np.float64)
         except (Exception, SystemExit) as error:
             raise LawFailed(f"the law raised {type(error).__name__}: {error}") from error
-        if not np.isfinite(commands).all():
-            raise LawFailed("the law commanded what is not finite")
-        return commands
+        return command
 
     def _in_the_papers_direction(self, on_the_circle: Observation) -> LawStep:
         """The law in flight; one that has no setting for it is turned round if it circles the other way."""
@@ -142,28 +159,29 @@ def _cycle(loop: Loop, x: Array) -> _Cycle:
     return _Cycle(omega, e, r, u, U, np.concatenate([[bias], off.real, off.imag]))
 
 
-def limit_cycle(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
-    """The predicted limit cycle; None if there is none with a command amplitude of `VISIBLE` or more.
+def balanced(loop: Loop, starts: Iterable[Array], harmonics: int = HARMONICS) -> LimitCycle | None:
+    """The first oscillation in balance that one of the `starts` leads to; None where none does.
 
-    Raises ValueError when the heading-rate limit is below the heading rate of the circle.
+    That there is no limit cycle does not follow from None. A start is the unknowns of `_cycle`.
     """
-    if loop.law.max_heading_rate <= abs(loop.turn):
-        raise ValueError("the circle cannot be held: the heading-rate limit is below what it takes")
-    gain, omega = critical_gain(loop.response, loop.period)
-    if math.isinf(gain):
-        return None
-    limit = min(loop.law.max_heading_rate, 10.0 * abs(loop.turn))
-    for slower in (1.0, 0.7, 0.5):
-        for amplitude in (0.5 * limit / gain, 0.05 * limit / gain):
-            x = _balanced(loop, np.array([math.log(slower * omega), math.log(amplitude), 0.0]), harmonics)
-            if x is not None:
-                return _limit_cycle(loop, _cycle(loop, x))
+    for start in starts:
+        x = _balanced(loop, start, harmonics)
+        if x is not None:
+            return _limit_cycle(loop, _cycle(loop, x))
     return None
+
+
+def unknowns(omega: float, E: Complex, range_mean: float, airspeed: float) -> Array:
+    """The unknowns of an oscillation: rad/s, harmonics of the heading error from 1 on, rad, and mean range error, m."""
+    turned = E * np.exp(-1j * np.arange(1, len(E) + 1) * np.angle(E[0])) / abs(E[0])
+    known = [math.log(omega), math.log(abs(E[0])), range_mean / airspeed]
+    return np.concatenate([known, turned[1:].real, turned[1:].imag])
 
 
 def _balanced(loop: Loop, guess: Array, harmonics: int) -> Array | None:
     """The unknowns of the limit cycle, solved with more and more harmonics; None if the guess leads to no solution."""
-    for count in sorted({1, min(3, harmonics), min(7, harmonics), harmonics}):
+    known = (len(guess) - 1) // 2
+    for count in sorted({count for count in (1, 3, 7, harmonics) if known <= count <= harmonics}):
         solution = _solved(lambda x: _cycle(loop, x).imbalance, _with_harmonics(guess, count))
         if solution is None:
             return None
@@ -202,10 +220,10 @@ def _limit_cycle(loop: Loop, cycle: _Cycle) -> LimitCycle | None:
 
 
 class Crossover(NamedTuple):
-    """Where the loop of law and inner loop, opened at the command, neither amplifies nor weakens an oscillation."""
+    """The gain crossover of the loop of law and inner loop, opened at the command."""
 
     frequency: float  # rad/s
-    phase_margin: float  # rad: lag that the loop can still bear there; below zero when it oscillates by itself
+    phase_margin: float  # rad; negative: unstable
     gain: float  # 1/s, of the law there: command over heading error
 
 
@@ -225,7 +243,7 @@ def crossover(loop: Loop) -> Crossover | None:
     for share in (1.0, 0.5, 0.2, 0.08, 0.03, 0.01):
         omega = share * fastest
         x = _solved(imbalance, np.array([math.log(omega), math.log(0.5 * VISIBLE / omega), 0.0]))
-        if x is not None:
+        if x is not None and _is_sampled(loop, x):
             cycle = _cycle(loop, x)
             once_round = complex(1.0 + cycle.imbalance[1], cycle.imbalance[2])
             return Crossover(cycle.omega, cmath.phase(once_round), abs(cycle.U[1]) / math.exp(x[1]))
@@ -243,6 +261,11 @@ def boundary(loop_at: Callable[[float], Loop], guess: float) -> float:
         loop = loop_at(off * guess)
         gain, omega = critical_gain(loop.response, loop.period)
         x = _solved(imbalance, np.array([math.log(omega), math.log(0.5 * VISIBLE / gain), 0.0, math.log(off * guess)]))
-        if x is not None:
+        if x is not None and _is_sampled(loop, x):
             return float(np.exp(x[3]))
     return math.nan
+
+
+def _is_sampled(loop: Loop, x: Array) -> bool:
+    """Whether commands held for a period can follow an oscillation: it is no faster than half their frequency."""
+    return bool(math.exp(x[0]) * loop.period <= math.pi)

@@ -135,6 +135,16 @@ class Tuning:
         counts = Counter((attempt.refused_by, not attempt.was_flown) for attempt in self.attempts if attempt.refused_by)
         return {what: (count, before) for (what, before), count in counts.most_common()}
 
+    @property
+    def unchecked(self) -> Mapping[str, int]:
+        """What is asked only where it is known: in how many trials that were flown it was unknown for a flight."""
+        flown = [attempt.candidate.facts for attempt in self.attempts if attempt.was_flown]
+        return {
+            one.name: sum(any(facts.get(one.name) is None for facts in trial) for trial in flown)
+            for one in self.requirements
+            if one.where_known
+        }
+
     def decisive(self, attempt: Attempt) -> int:
         """The number of the condition in which an attempt is worst in the first goal."""
         ideal = METRICS[self.goals[0]].ideal

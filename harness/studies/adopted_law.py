@@ -133,7 +133,7 @@ def examined(flights: Sequence[Flight]) -> list[Aircraft]:
                 Judged(
                     gains=gains,
                     k2=_nftsm(base[name, "sixdof", gains]).k2,
-                    margin=following(base[name, "sixdof", gains], cycle=False).margin or math.nan,
+                    margin=_margin(base[name, "sixdof", gains]),
                     flown=found[name, "sixdof", gains],
                     kinematic=found[name, "kinematic", gains],
                 )
@@ -142,6 +142,11 @@ def examined(flights: Sequence[Flight]) -> list[Aircraft]:
         )
         for name, border in borders.items()
     ]
+
+
+def _margin(flight: Flight) -> float:
+    margin = following(flight, cycle=False).margin
+    return math.nan if margin is None else margin
 
 
 def _nftsm(flight: Flight) -> Nftsm:

@@ -22,7 +22,8 @@ from harness.drawing import draw
 from harness.identification.fit import fit
 from harness.identification.identify import of_heading_rate
 from harness.identification.manoeuvres import STEP, flown, held
-from harness.limit_cycle.prediction import LimitCycle, Loop, boundary, limit_cycle
+from harness.limit_cycle.cycle import balance, limit_cycle
+from harness.limit_cycle.prediction import LimitCycle, Loop, boundary
 from harness.plants.identified import Identified, identified
 from harness.plants.lagged import Lagged
 from harness.plants.sixdof import SixDof
@@ -87,7 +88,7 @@ def cycles() -> Iterator[FlownCycle]:
                 sixdof=fly(loop, SixDof(airframe, STEP, rate_trim=True)),
                 lagged=fly(loop, known.lagged),
                 predicted=limit_cycle(loop),
-                one_harmonic=limit_cycle(loop, harmonics=1),
+                one_harmonic=balance(loop, harmonics=1),
                 slow=limit_cycle(replace(loop, response=slow)),
             )
 
