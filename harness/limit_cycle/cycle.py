@@ -33,9 +33,10 @@ def balance(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
     Raises `UnsettledError` and `LawFailed`.
     """
     motion = settled(loop)
-    if motion.rests:
+    omega = math.tau * _measured(loop, motion).frequency
+    if motion.rests or omega == 0.0:
         return None
-    starts = (_unknowns(loop, motion, count) for count in sorted({harmonics, 1}, reverse=True))
+    starts = (_unknowns(loop, motion, omega, count) for count in sorted({harmonics, 1}, reverse=True))
     return balanced(loop, starts, harmonics)
 
 
@@ -60,9 +61,8 @@ def _measured(loop: Loop, motion: Motion) -> LimitCycle:
     return measured(np.diff(motion.e) / loop.period, motion.r[:-1], motion.u[:-1], loop.period)
 
 
-def _unknowns(loop: Loop, motion: Motion, harmonics: int) -> Array:
+def _unknowns(loop: Loop, motion: Motion, omega: float, harmonics: int) -> Array:
     """The oscillation of a motion, by least squares, as a start for the balance."""
-    omega = math.tau * _measured(loop, motion).frequency
     turns = np.exp(1j * omega * loop.period * np.outer(np.arange(len(motion.e)), np.arange(1, harmonics + 1)))
     waves = np.hstack([np.ones((len(turns), 1)), 2.0 * turns.real, -2.0 * turns.imag])
     found = np.linalg.lstsq(waves, motion.e, rcond=None)[0]

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _START = 1.0  # m outside the circle
 _SHORTEST = 60.0  # s: of a stretch of the march; it has `_CYCLES`, too
 _CYCLES = 40.0  # at the frequency at which the inner loop first becomes unstable
+_FEWEST, _MOST_PERIODS = 100, 20_000  # guidance periods of a stretch, whatever its time
 _STRETCHES = 5  # at most
 _ALIKE = 0.1  # by which the swing of the command differs in two stretches, at most, where the motion is steady
 _FACTOR = 4.0  # on the gain, from one step to the next, until the limit cycle begins or ends
@@ -118,4 +119,5 @@ def matrices(loop: Loop) -> tuple[Array, Array, Array]:
 def _periods(loop: Loop) -> int:
     """How many guidance periods a stretch of the march has."""
     omega = critical_gain(loop.response, loop.period)[1]
-    return math.ceil(max(_SHORTEST, _CYCLES * math.tau / omega) / loop.period)
+    lasts = max(_SHORTEST, _CYCLES * math.tau / omega)
+    return min(max(_FEWEST, math.ceil(lasts / loop.period)), _MOST_PERIODS)
