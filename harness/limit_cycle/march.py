@@ -1,4 +1,4 @@
-"""A loop marched in time from beside its circle, until it comes to rest or keeps on swinging.
+"""A loop simulated in time from beside its circle, until it comes to rest or keeps on swinging.
 
 It is the same sampled loop whose limit cycle `prediction` balances. The march finds one where no balance is found, and
 shows where to look for the balance.
@@ -60,7 +60,7 @@ def settled(loop: Loop) -> Motion:
         for i in range(n):
             e, r = (H @ x).tolist()
             if abs(e) > math.pi:
-                raise UnsettledError("calculated in time, the loop leaves its circle")
+                raise UnsettledError("simulated in time, the loop leaves its circle")
             u = command(e, r)
             rows[i] = e, r, u
             x = F @ x + g * (u - loop.turn)
@@ -69,7 +69,7 @@ def settled(loop: Loop) -> Motion:
         if motion.rests or abs(swings[-1] - swings[-2]) <= _ALIKE * swings[-1]:
             return motion
     if all(later < earlier for earlier, later in pairwise(swings[1:])):
-        raise UnsettledError(f"calculated over {_STRETCHES * n * loop.period:.0f} s, the loop is still settling")
+        raise UnsettledError(f"simulated over {_STRETCHES * n * loop.period:.0f} s, the loop is still settling")
     return motion  # it swings irregularly
 
 

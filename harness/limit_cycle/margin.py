@@ -117,7 +117,7 @@ def gain_margin(loop: Loop, gain: float | None = None) -> float:
     """The factor on the law's gain at which the limit cycle begins; inf where none can.
 
     `gain`, 1/s, is the law's at its crossover, from which the search then starts. Where no balance is found the loop is
-    calculated in time with one gain after another. Raises `UnsettledError` where that gives no answer either.
+    simulated with one gain after another. Raises `UnsettledError` where that gives no answer either.
     """
     critical, _ = critical_gain(loop.response, loop.period)
     if math.isinf(critical):
