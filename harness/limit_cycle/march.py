@@ -1,4 +1,4 @@
-"""A loop simulated in time from beside its circle, until it comes to rest or keeps on swinging.
+"""A loop simulated in time from beside its circle, until it comes to rest or oscillates steadily.
 
 It is the same sampled loop whose limit cycle `prediction` balances. The march finds one where no balance is found, and
 shows where to look for the balance.
@@ -24,7 +24,7 @@ _SHORTEST = 60.0  # s: of a stretch of the march; it has `_CYCLES`, too
 _CYCLES = 40.0  # at the frequency at which the inner loop first becomes unstable
 _FEWEST, _MOST_PERIODS = 100, 20_000  # guidance periods of a stretch, whatever its time
 _STRETCHES = 5  # at most
-_ALIKE = 0.1  # by which the swing of the command differs in two stretches, at most, where the motion is steady
+_ALIKE = 0.1  # largest relative difference of the command's range between two stretches of a steady motion
 _FACTOR = 4.0  # on the gain, from one step to the next, until the limit cycle begins or ends
 _MOST = 1e3  # times more or less gain: there is no border then
 _EXACT = 1.01  # a border is found to within this factor
@@ -43,7 +43,7 @@ class Motion(NamedTuple):
 
     @property
     def rests(self) -> bool:
-        """Whether the command swings by less than `VISIBLE`: there is no limit cycle."""
+        """Whether the command oscillates by less than `VISIBLE`: there is no limit cycle."""
         return bool(np.ptp(self.u) < 2.0 * VISIBLE)
 
 
@@ -54,8 +54,8 @@ def settled(loop: Loop) -> Motion:
     command, n = loop.started(), _periods(loop)
     x = np.zeros(len(F))
     x[np.argmax(H[1])] = _START / loop.airspeed
-    swings = [0.0]
-    while len(swings) <= _STRETCHES:
+    ranges = [0.0]
+    while len(ranges) <= _STRETCHES:
         rows = np.empty((n, 3))
         for i in range(n):
             e, r = (H @ x).tolist()
@@ -65,12 +65,12 @@ def settled(loop: Loop) -> Motion:
             rows[i] = e, r, u
             x = F @ x + g * (u - loop.turn)
         motion = Motion(*rows.T)
-        swings.append(float(np.ptp(motion.u)))
-        if motion.rests or abs(swings[-1] - swings[-2]) <= _ALIKE * swings[-1]:
+        ranges.append(float(np.ptp(motion.u)))
+        if motion.rests or abs(ranges[-1] - ranges[-2]) <= _ALIKE * ranges[-1]:
             return motion
-    if all(later < earlier for earlier, later in pairwise(swings[1:])):
+    if all(later < earlier for earlier, later in pairwise(ranges[1:])):
         raise UnsettledError(f"simulated over {_STRETCHES * n * loop.period:.0f} s, the loop is still settling")
-    return motion  # it swings irregularly
+    return motion  # it oscillates irregularly
 
 
 def marched_margin(loop: Loop) -> float:
