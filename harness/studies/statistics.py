@@ -139,7 +139,7 @@ def judge(differences: Array, at: Sequence[Mapping[str, object]], column: str = 
     return judged(Pairs(reference, other, other[:0]), where, [column], "sixdof", Assess(), assumption=True)
 
 
-class Shares(NamedTuple):
+class FalseHolds(NamedTuple):
     """How often a family of cells had a false word for a share of flights, and how many of its words were decided."""
 
     part: str
@@ -157,7 +157,7 @@ TRUTHS = (1.001, 0.2)  # times the margin: just outside, and well inside
 
 def shares(
     cells: int, seeds: Sequence[int] = SHARE_SEEDS, replications: int = REPLICATIONS, truths: Sequence[float] = TRUTHS
-) -> Iterator[Shares]:
+) -> Iterator[FalseHolds]:
     """Families of cells in which this share of the flights is in a limit cycle, or alone does not converge."""
     at = [{"cell": float(i)} for i in range(cells)]
     for (column, sign), times, n in product((("chatters", 1.0), ("converged", -1.0)), truths, seeds):
@@ -168,7 +168,7 @@ def shares(
             judgements = judge(np.where(draws.random((cells, n)) < truth, sign, 0.0), at, column)
             wrong += any(judgement.word == false for judgement in judgements)
             decided += sum(judgement.word != Verdict.UNDECIDED for judgement in judgements)
-        yield Shares(PARTS[column].title, cells, truth, n, wrong / replications, decided / (replications * cells))
+        yield FalseHolds(PARTS[column].title, cells, truth, n, wrong / replications, decided / (replications * cells))
 
 
 AXES: Mapping[str, Sequence[object]] = MappingProxyType(
@@ -258,7 +258,7 @@ class Proof(NamedTuple):
 
     coverage: list[Coverage]
     words: list[Words]
-    shares: list[Shares]
+    shares: list[FalseHolds]
     conditions: list[Conditions]
 
 
