@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.limit_cycle.march import Motion, UnsettledError, settled
+from harness.limit_cycle.march import LoopMotion, UnsettledError, settled
 from harness.limit_cycle.prediction import HARMONICS, LimitCycle, Loop, balanced, unknowns
 
 Array = NDArray[np.float64]
@@ -57,11 +57,11 @@ def measured(rate: Array, error: Array, commanded: Array, period: float) -> Limi
     return LimitCycle(frequency, amplitude(rate), amplitude(commanded), float(error.mean()), amplitude(error))
 
 
-def _measured(loop: Loop, motion: Motion) -> LimitCycle:
+def _measured(loop: Loop, motion: LoopMotion) -> LimitCycle:
     return measured(np.diff(motion.e) / loop.period, motion.r[:-1], motion.u[:-1], loop.period)
 
 
-def _unknowns(loop: Loop, motion: Motion, omega: float, harmonics: int) -> Array:
+def _unknowns(loop: Loop, motion: LoopMotion, omega: float, harmonics: int) -> Array:
     """The oscillation of a motion, by least squares, as a start for the balance."""
     turns = np.exp(1j * omega * loop.period * np.outer(np.arange(len(motion.e)), np.arange(1, harmonics + 1)))
     waves = np.hstack([np.ones((len(turns), 1)), 2.0 * turns.real, -2.0 * turns.imag])

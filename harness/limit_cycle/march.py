@@ -34,7 +34,7 @@ class UnsettledError(ValueError):
     """A march ended without an answer; the message says why."""
 
 
-class Motion(NamedTuple):
+class LoopMotion(NamedTuple):
     """The last stretch of a march, a value per guidance period. SI, rad."""
 
     e: Array  # heading error
@@ -48,7 +48,7 @@ class Motion(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def settled(loop: Loop) -> Motion:
+def settled(loop: Loop) -> LoopMotion:
     """How the loop moves in the end. Raises `UnsettledError` and `LawFailed`."""
     F, g, H = matrices(loop)
     command, n = loop.started(), _periods(loop)
@@ -64,7 +64,7 @@ def settled(loop: Loop) -> Motion:
             u = command(e, r)
             rows[i] = e, r, u
             x = F @ x + g * (u - loop.turn)
-        motion = Motion(*rows.T)
+        motion = LoopMotion(*rows.T)
         ranges.append(float(np.ptp(motion.u)))
         if motion.rests or abs(ranges[-1] - ranges[-2]) <= _ALIKE * ranges[-1]:
             return motion

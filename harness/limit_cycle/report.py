@@ -19,7 +19,7 @@ _NEAR = 1.15  # times a border: the loop is tried so far on either side of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class LoopReport:
     """What is predicted of a law behind the inner loop of an airframe. SI, rad; None where unknown."""
 
     aircraft: str
@@ -35,12 +35,12 @@ class Report:
     most_gains: tuple[float, float] | None = None  # k2 and k3, 1/s, without a limit cycle; for NFTSM
 
 
-def report(flight: Flight) -> Report:
+def report(flight: Flight) -> LoopReport:
     """What is predicted of a flight. Raises `IdentifiedError`."""
     airspeed = flight.start.airspeed
     response = identified(aircraft.folder(flight.aircraft), airspeed).heading_rate
     loop = Loop(flight.law, response, airspeed, flight.guidance_period)
-    found = Report(
+    found = LoopReport(
         aircraft=flight.aircraft,
         airspeed=airspeed,
         period=loop.period,
@@ -73,7 +73,7 @@ def _border(loop_at: Callable[[float], Loop], guess: float) -> float | None:
     return q if is_border else None
 
 
-def rows(found: Report) -> Iterator[tuple[str, str]]:
+def rows(found: LoopReport) -> Iterator[tuple[str, str]]:
     """The report as a table of two columns, in the units of a terminal."""
     loop = found.following
     yield "limit cycle", _verdict(loop)
@@ -95,7 +95,7 @@ def rows(found: Report) -> Iterator[tuple[str, str]]:
     yield "critical gain", f"{found.critical_gain:.3g} 1/s (from heading error to command)"
 
 
-def sentences(found: Report) -> Iterator[str]:
+def sentences(found: LoopReport) -> Iterator[str]:
     """What would avoid the limit cycle, or begin it."""
     if found.least_bandwidth is not None:
         bandwidth, times = found.least_bandwidth, found.least_bandwidth / found.bandwidth
@@ -111,7 +111,7 @@ def sentences(found: Report) -> Iterator[str]:
         yield f"no limit cycle up to k2 = {k2:.3g}, k3 = {k3:.3g} 1/s"
 
 
-def document(found: Report) -> dict[str, object]:
+def document(found: LoopReport) -> dict[str, object]:
     """The report for JSON: SI, rad; null where unknown, or infinite."""
     told = asdict(found)
     loop = told.pop("following")
