@@ -398,6 +398,21 @@ def test_a_fit_that_is_refused_costs_neither_page_nor_tables(tmp_path: Path) -> 
     assert not (tmp_path / "a.toml").exists()
 
 
+def test_fit_replaces_no_file_but_its_own(fitted: Path, tmp_path: Path) -> None:
+    short, law = EXPERIMENTS / "flights" / "lateral_doublet_4.csv", write(tmp_path / "law.py", "x = 1\n")
+    kept = write(tmp_path / "kept.toml", "[flight]\n")
+    for words, why in (
+        (("--fit", law), "must end with .toml"),
+        (("--fit", kept), "exists and is not a file of --fit"),
+        (("--fit", tmp_path / "a.toml", "--out", tmp_path / "a.toml"), "must be different files"),
+    ):
+        done = invoke("assess", short, *words)
+        assert (done.exit_code, why in done.stderr) == (2, True), done.output
+    assert (law.read_text(), kept.read_text()) == ("x = 1\n", "[flight]\n")
+    again = invoke("assess", short, "--fit", shutil.copy(fitted, tmp_path / "again.toml"))
+    assert "no aircraft can be fitted" in again.stderr
+
+
 def test_beside_a_flight_of_the_model_itself_the_model_says_the_same() -> None:
     found = assess(log(ON_BOARD).recorded())
     model = beside(found, aircraft.folder(log(ON_BOARD).flight.aircraft))

@@ -62,6 +62,10 @@ def compared(flown: Path, *words: object) -> dict[str, Any]:
     return answer
 
 
+def parts(answer: dict[str, Any]) -> list[dict[str, Any]]:
+    return [row for card in answer["scorecards"] for row in card["parts"]]
+
+
 def part(answer: dict[str, Any], column: str) -> dict[str, Any]:
     (card,) = answer["scorecards"]
     return next(part for part in card["parts"] if part["column"] == column)
@@ -98,6 +102,18 @@ def test_json_holds_pairs_differences_scorecards_and_the_margins_of_the_run(flow
         assert (cell["pairs"], cell["seeds"]) == (5, 5)
     assert part(answer, "command_activity_deg_s2")["fails"] == sum(cell["verdict"] == "fails" for cell in activity)
     assert part(answer, "altitude_deviation_peak_m")["verdict"] == "holds"
+
+
+def test_one_seed_of_a_matrix_with_draws_decides_nothing(flown: Path, tmp_path: Path) -> None:
+    predicted = {"heading_rate_gain_slow", "limit_cycle_margin", "bank_reserve_deg"}  # which no seed decides
+    one = parts(compared(flown, "--where", "seed=2"))
+    words = {row["verdict"] for row in one if row["column"] not in predicted}
+    assert not words & {"holds", "fails"}, words
+    fixed = EXPERIMENT.replace(
+        '"start.heading_deg" = { uniform = [20.0, 60.0] }\nseed = { start = 0, count = 5 }\n', ""
+    )
+    words = {row["verdict"] for row in parts(compared(run(tmp_path, fixed)))}
+    assert words & {"holds", "fails"}
 
 
 def test_without_the_kinematic_plant_the_lowest_is_the_baseline(tmp_path: Path) -> None:

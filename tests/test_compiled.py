@@ -365,6 +365,12 @@ def test_a_power_in_place_is_compiled_with_the_bits_of_python(tmp_path: Path) ->
     assert compiled(flight).digest == loop.simulate(flight).digest
 
 
+def test_whole_numbers_that_python_lets_grow_without_limit_are_not_compiled(tmp_path: Path) -> None:
+    own(tmp_path, "turns = int(o.north)")
+    flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"))
+    assert engine.why_plain(flight).endswith("uses 'int'")
+
+
 def test_kernels_that_were_not_used_for_long_give_way_to_new_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

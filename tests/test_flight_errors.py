@@ -299,12 +299,12 @@ def test_each_aircraft_of_a_matrix_is_tried_before_it_flies(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("errors", [Errors(command_delay=0.1), Errors(mass_scale=1.1), Errors(actuator_lag=0.1)])
 def test_of_a_loop_that_an_error_changes_nothing_is_predicted(errors: Errors) -> None:
-    assert why_unknown(replace(SIXDOF, errors=errors)).startswith("the prediction does not know of errors.")
+    assert why_unknown(replace(SIXDOF, errors=errors)).startswith("the prediction leaves out errors.")
     assert why_unknown(replace(SIXDOF, errors=Errors(wind=1.0))) == ""
 
 
 def test_the_command_predict_warns_of_an_error_that_it_leaves_out() -> None:
     stationary = EXPERIMENTS / "stationary.toml"
     told = invoke("predict", stationary, "--set", "errors.command_delay_s=0.1")
-    assert told.stderr == "warning: the prediction does not know of errors.command_delay\n"
+    assert told.stderr == "warning: the prediction leaves out errors.command_delay\n"
     assert invoke("predict", stationary, "--set", "errors.wind_mps=1.0").stderr == ""

@@ -122,7 +122,7 @@ def test_where_the_search_fails_the_answer_is_unknown_with_the_reason(monkeypatc
     loop = Flight(plant="sixdof", law=law("nftsm", k2=3.21, k3=1.23), start=Start(airspeed=13.0))
     found = following(loop)
     assert (found.chatters, found.margin, found.cycle) == (None, None, None)
-    reason = "the gain at which the limit cycle begins was not found: the loop leaves its circle"
+    reason = "the loop leaves its circle, so that the gain at which the limit cycle begins was not found"
     assert found.reason == why_unknown(loop) == reason
     told = invoke("predict", STATIONARY, "--set", "law.gains=fitted", "--set", "law.k2=3.21", "--set", "law.k3=1.23")
     assert f"unknown: {reason}" in told.stdout

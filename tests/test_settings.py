@@ -217,7 +217,10 @@ def test_a_mistake_in_an_override_is_told_as_it_was_typed(write: Write) -> None:
         ("\n[flight", "a.toml:2: not valid TOML: Expected ']' at the end of a table declaration"),
         (b"# \xc3\xa4\n# \xff\n", "a.toml:2: not text in UTF-8"),
         ("", "a.toml:1: flight: is missing, must be a table"),
-        (f"{SHORTEST}[matrix]\nseed = [1]\n", "a.toml:5: matrix: is many flights, must be one: use `harness run`"),
+        (
+            f"{SHORTEST}[matrix]\nseed = [1]\n",
+            "a.toml:5: matrix: describes many flights, must be one: fix each axis by --set, or use `harness run`",
+        ),
     ],
 )
 def test_a_file_that_is_no_flight_is_told_in_one_line(write: Write, text: str | bytes, told: str) -> None:

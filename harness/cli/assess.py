@@ -71,8 +71,11 @@ def assess(
 
     if not begin < end:
         raise BadInput(f"--from {begin:g} --to {end:g}: the first must be less than the second")
-    for path in filter(None, (fit, rrd, out)):
-        writable(path)
+    written = [writable(path) for path in (fit, rrd, out) if path is not None]
+    if len({path.resolve() for path in written}) < len(written):
+        raise BadInput("--fit, --rrd and --out: must be different files")
+    if fit is not None:
+        _check_fit(fit)
     whole = read_log(logs, map_name)
     flight = whole.between(begin, end)
     if not flight.channels:
@@ -107,3 +110,17 @@ def assess(
     if fit and not as_json:
         plants = "plants lagged and coordinated" if read(fit)[0].bank else "plant lagged"
         click.echo(f"\naircraft = {json.dumps(str(fit))}: for the {plants}")
+
+
+def _check_fit(fit: Path) -> None:
+    """BadInput for a name that no aircraft has, or the name of a file that is none."""
+    from harness.cli._input import BadInput
+    from harness.plants.identified import IdentifiedError, read
+
+    if fit.suffix != ".toml":
+        raise BadInput(f"--fit {fit}: must end with .toml")
+    try:
+        if fit.exists():
+            read(fit)
+    except IdentifiedError:
+        raise BadInput(f"--fit {fit}: exists and is not a file of --fit; choose another name") from None

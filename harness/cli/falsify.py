@@ -190,8 +190,8 @@ def _print_found(search: Falsification, counterexample: Path | None) -> None:
     bound = search.bound
     failed = f", and {bound.failed} failed and count as broken" if bound.failed else ""
     drawn = f"{bound.broken} of {counted(bound.trials, 'uniform trial')} broke it{failed}"
-    share = f"at most {100.0 * bound.share:.3g} %" if bound.share < 1.0 else "any share"
-    click.echo(f"{drawn}: with 95 % confidence {share} of the settings in the ranges that can be flown")
+    share = f"at most {100.0 * bound.share:.3g} % of the valid settings do, with 95 % confidence"
+    click.echo(f"{drawn}: {share if bound.share < 1.0 else 'no bound on the share of the valid settings that do'}")
     if counterexample:
         click.echo(f"next: harness fly {counterexample}, or harness view {counterexample}")
 

@@ -265,7 +265,8 @@ class _Writer(ast.NodeTransformer):
             return _name(self._lifting.function(value))
         name = getattr(value, "__name__", "")
         is_error = isinstance(value, type) and issubclass(value, BaseException)
-        if getattr(builtins, name, None) is value and (name in _BUILTINS or is_error):
+        is_builtin = name in _BUILTINS and (name != "int" or _is_ours(self._of.function))  # without an end in Python
+        if getattr(builtins, name, None) is value and (is_builtin or is_error):
             return _name(name)
         raise NotLiftedError(f"{self._of.function.__name__} uses {getattr(value, '__name__', value)!r}")
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.guidance import Remembering, started
 from autopilot.linear import Linear
 from harness.chatter import VISIBLE
 from harness.limit_cycle.march import matrices
@@ -27,7 +28,9 @@ def linearised(loop: Loop) -> Linear | None:
 
 
 def has_memory(loop: Loop) -> bool:
-    """Whether the loop's law answers otherwise when it was asked before."""
+    """Whether the loop's law declares a memory, or answers otherwise when it was asked before."""
+    if isinstance(started(loop.law, loop.context), Remembering):
+        return True
     e = np.linspace(-0.01, 0.02, _TRIED)
     r = np.linspace(0.3, -0.2, _TRIED)
     alone = [loop.commands(e[i : i + 1], r[i : i + 1])[0] for i in range(_TRIED)]

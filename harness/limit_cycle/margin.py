@@ -97,7 +97,7 @@ def _judged(loop: Loop) -> tuple[Crossover | None, float, str]:
     try:
         return crossing, gain_margin(loop, crossing.gain if crossing else None), ""
     except UnsettledError as error:
-        return crossing, math.nan, f"the gain at which the limit cycle begins was not found: {error}"
+        return crossing, math.nan, f"{error}, so that the gain at which the limit cycle begins was not found"
 
 
 def _cycle(loop: Loop) -> LimitCycle:

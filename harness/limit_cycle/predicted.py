@@ -57,10 +57,10 @@ def why_unknown(flight: Flight) -> str:
 
 
 def unforeseen(flight: Flight) -> str:
-    """The active error of the flight that the prediction does not model, in a sentence; empty where there is none."""
+    """The active errors of the flight that the prediction does not model, in a sentence; empty where there is none."""
     misled = flight.errors.response_speed != 1.0 and uses_response(flight.law)
     left_out = [*flight.errors.of_loop, *(["response_speed"] if misled else [])]
-    return f"the prediction does not know of errors.{left_out[0]}" if left_out else ""
+    return f"the prediction leaves out {', '.join(f'errors.{name}' for name in left_out)}" if left_out else ""
 
 
 def _why_not(flight: Flight) -> str:

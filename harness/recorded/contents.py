@@ -65,7 +65,8 @@ def _row(name: str, flight: RecordedFlight) -> list[str]:
     unit, scale = SHOWN.get(QUANTITIES[name].unit, (QUANTITIES[name].unit, 1.0))
     what = ", ".join(filter(None, (channel.basis, channel.note)))
     least, greatest = (number(float(value), scale) for value in (channel.values.min(), channel.values.max()))
-    span = channel.time[-1] - channel.time[0]
+    repeats = channel.rows > len(channel)  # then its rows go on after its last new value
+    span = flight.end - flight.begin if repeats else channel.time[-1] - channel.time[0]
     rates = channel.rate, (channel.rows - 1) / span if span else math.nan, channel.longest_gap
     return [name, *map(_finite, rates), least, greatest, unit, what]
 

@@ -1,6 +1,7 @@
 """The results of a run as one table: a row per flight, a column per setting and metric."""
 
 import json
+import re
 import sqlite3
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.runs.journal import JOURNAL, StoreError, reading, state
 from harness.runs.store import last_run
-from harness.settings.columns import by_column, is_setting
+from harness.settings.columns import DRAWN, by_column, is_setting
 from harness.settings.law_source import FILES
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ _NEEDED: Mapping[str, Collection[str]] = {  # what each flight has, and which th
     "plant": PLANTS, "outcome": [outcome.value for outcome in Outcome], "law.name": (), "aircraft": (),
 }  # fmt: skip
 _STATE = b"journal_state"  # in the Parquet file's metadata: the `state` of the journal that was exported
+_DRAW = re.compile(r"\b(uniform|normal)\s*=")  # a value that is drawn from the seed, in settings or a command
 
 
 def load_results(folder: Path | str) -> "pd.DataFrame":
@@ -48,6 +50,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         table = _exported(folder / PARQUET, state(journal))
         if table is None:
             table = _table(journal)
+        runs = journal.execute("SELECT settings, command FROM runs").fetchall()
     if not len(table):
         command = last_run(folder)["command"]
         raise StoreError(
@@ -59,6 +62,7 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         if unknown := [value for value in values if not (isinstance(value, str) and value in (known or [value]))]:
             why = f"{unknown[0]}, which this harness does not know" if known else f"{unknown[0]}, must be text"
             raise StoreError(f"{folder / JOURNAL}: cannot be used: the {name} of a flight is {why}")
+    results.attrs[DRAWN] = any(_DRAW.search(f"{settings} {command}") for settings, command in runs)
     return results
 
 

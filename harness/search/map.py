@@ -218,8 +218,8 @@ def map_of(space: Space, asked: Question, *, resolution: int, flights: int | Non
     first = sum(len(panel.border.first) * len(panel.conditions) for panel in made.panels)
     if flights is not None and flights < first:
         raise SearchError(
-            f"--flights is {flights}, must be {first} at least, which is the first, coarse lattice: with a smaller "
-            "--resolution it has fewer points"
+            f"--flights is {flights}, must be {first} at least, which is the first, coarse lattice"
+            + (": with a smaller --resolution it has fewer points" if resolution > LEAST else "")
         )
     made.flights = flights or max(made.full // _SHARE, min(made.full, _ROUNDS * first))
     return made

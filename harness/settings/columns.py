@@ -8,6 +8,7 @@ from typing import Any
 from harness.flight import Flight
 from harness.settings.table import schema_of
 
+DRAWN = "drawn"  # in the `attrs` of a table: whether any setting of its run is drawn from the seed
 DIRECTORY = "directory"  # no setting: where a flight lies, in a table of the flights of several directories
 _LISTS_OF_TABLES = ("segments", "gusts")
 

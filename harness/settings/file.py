@@ -50,9 +50,9 @@ class SettingsFile:
         """The file's one flight; with `started` it is tried whether it can start. Raises `SettingsError`."""
         matrix = self.document.get("matrix")
         if matrix and isinstance(matrix, dict):
-            raise SettingsError(
-                [f"{self._place(('matrix',)).text}: matrix: is many flights, must be one: use `harness run`"]
-            )
+            place = self._place(("matrix",)).text
+            many = "describes many flights, must be one: fix each axis by --set, or use `harness run`"
+            raise SettingsError([f"{place}: matrix: {many}"])
         return _flight(self.document, self._place, self.path.parent, started=started, run=True)
 
     def experiment(self) -> Experiment:

@@ -129,6 +129,6 @@ def quiet(comparison: Comparison) -> Iterator[str]:
             (f" with {comparison.by} = {shown(value)}", _cycling(flights[flights[comparison.by] == value]))
             for value in values
         ]
-    told = [f"{of.of - of.number} of {of.of}{which}" for which, of in cycling if of.of]
+    told = [f"{of.number} of {of.of}{which}" for which, of in cycling if of.of]
     if told:
-        yield f"No limit cycle, among the flights in which this can be decided, in {', '.join(told)}."
+        yield f"In a limit cycle, of the flights in which this can be decided: {', '.join(told)}."

@@ -13,7 +13,7 @@ from harness.error import HarnessError
 from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
-from harness.settings.columns import DIRECTORY, is_setting
+from harness.settings.columns import DIRECTORY, DRAWN, is_setting
 from harness.world.wind import SEVERITIES
 
 Array = NDArray[np.float64]
@@ -274,6 +274,8 @@ def is_drawn(flights: pd.DataFrame) -> bool:
     noisy = {"wind.turbulence": "none", "estimator.kind": "truth", "errors.course_noise_deg": 0.0}
     if any(name in flights and (flights[name] != quiet).any() for name, quiet in noisy.items()):
         return True
+    if flights["seed"].nunique() == 1:  # which shows nothing: the run knows
+        return bool(flights.attrs.get(DRAWN))
     return any(flights[column].nunique(dropna=False) > 1 for column in settings_of(flights) if column != "seed")
 
 

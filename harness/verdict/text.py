@@ -46,9 +46,10 @@ def lines(comparison: Comparison, mapped: str | None = None) -> Iterator[str]:
     yield from unpaired(comparison.unpaired)
     yield ""
     yield (
-        f"Intervals: {100 * CONFIDENCE:.0f} %, of the means of seeds; none below {LEAST_SEEDS} seeds; seeds that all "
-        f"agree count as exact from {LEAST_EQUAL} on, on a share of flights as so many draws. Words: two-sided tests "
-        f"at {comparison.assess.significance:g}, Holm's adjustment over one airframe's parts and cells."
+        f"Intervals: {100 * CONFIDENCE:.0f} %, of the means of seeds; none below {LEAST_SEEDS} seeds; {LEAST_EQUAL} "
+        f"or more seeds that all agree on a number count as exact; a share of flights on which all agree has the exact "
+        f"binomial interval. Words: two-sided tests at {comparison.assess.significance:g}, Holm's adjustment over one "
+        f"airframe's parts and cells."
     )
 
 
