@@ -63,7 +63,7 @@ class Nftsm(StandoffLaw):
 
 
 def behind_inner_loop(g: Nftsm, known: Known) -> Mapping[str, float]:
-    """k2 with a gain margin of two to the limit cycle, and k3 = k2 / 2 as in Table 2."""
+    """k2 is half of the highest without a limit cycle, and k3 = k2 / 2 as in Table 2."""
 
     def with_k2(k2: float) -> Nftsm:
         return replace(g, k2=k2, k3=0.5 * k2)
@@ -82,7 +82,7 @@ RULES = MappingProxyType(
     {
         "behind_inner_loop": Rule(
             "fitted",
-            "k2 with a gain margin of 2 to the limit cycle behind the airframe's inner loop, k3 = k2 / 2",
+            "k2 is half of the highest without a limit cycle behind the airframe's inner loop, k3 = k2 / 2",
             behind_inner_loop,
         ),
         "scaled": Rule(

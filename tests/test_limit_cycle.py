@@ -106,11 +106,14 @@ def test_a_law_that_is_singular_on_its_circle_has_no_margin_at_all() -> None:
     assert report(settings).most_gains is None
 
 
-def test_a_linear_law_that_is_unstable_at_any_gain_has_the_margin_zero() -> None:
-    """Feedback of the wrong sign."""
+def test_a_loop_that_diverges_without_an_oscillation_is_in_no_limit_cycle() -> None:
+    """Feedback of the wrong sign; and a weight so large that range errors are left alone."""
     row = np.zeros((1, 0))
     wrong = Linear(np.zeros((0, 0)), np.zeros((0, 2)), row, np.array([[1.0, 0.01]]))
-    assert crossing_and_margin(DEFAULT, wrong)[1] == 0.0
+    assert math.isnan(crossing_and_margin(DEFAULT, wrong)[1])
+    lazy = Flight(plant="sixdof", law=law("lq_orbit", weight=1e8), start=Start(airspeed=13.0))
+    assert following(lazy).chatters is None
+    assert following(lazy).reason == "linearised, the loop diverges without an oscillation"
 
 
 def test_where_the_search_fails_the_answer_is_unknown_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,7 @@ def predict(file: Path, overrides: tuple[str, ...], as_json: bool) -> None:
     from harness.cli._input import BadInput, flight_of, read_file
     from harness.limit_cycle import report
     from harness.plants.identified import IdentifiedError
+    from harness.settings.laws import kind_of_class, short
     from harness.tables import table
 
     settings = read_file(file, overrides)
@@ -45,6 +46,10 @@ def predict(file: Path, overrides: tuple[str, ...], as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(report.document(found), allow_nan=False))
         return
-    click.echo(f"{found.aircraft} at {found.airspeed:g} m/s, with a command held {found.period:g} s")
+    name, _ = kind_of_class(type(flight.law)) or (type(flight.law).__name__, None)
+    gains = getattr(flight.law, "gains", "")
+    law = f"{short(name)} with gains {gains}" if gains else short(name)
+    where = f"{found.aircraft} at {found.airspeed:g} m/s in still air"
+    click.echo(f"{law} on {where}, with commands held for {found.period:g} s")
     for line in [*table([], report.rows(found)), *report.sentences(found)]:
         click.echo(line)

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.guidance import Remembering, started
 from autopilot.linear import Linear
@@ -42,7 +43,7 @@ def crossing_and_margin(loop: Loop, law: Linear) -> tuple[Crossover | None, floa
 
     A gain can be the border only where the loop, opened at the command, has the phase of a sustained oscillation; of
     those the margin is the next above 1 of a stable loop, and below 1 that of an unstable one: inf and 0 where there is
-    none, as an unstable loop is then unstable with less gain, too.
+    none, as an unstable loop is then unstable with less gain, too. NaN where it diverges without an oscillation.
     """
     omega = math.pi / loop.period * np.append(np.geomspace(1e-4, 1.0, 6000, endpoint=False), 1.0)
     z = np.exp(1j * omega * loop.period)
@@ -66,12 +67,20 @@ def crossing_and_margin(loop: Loop, law: Linear) -> tuple[Crossover | None, floa
     for lower, border in reversed(list(pairwise(below))):
         if _is_stable(loop, law, 0.5 * (lower + border)):
             return crossover, float(border)
-    return crossover, 0.0
+    poles = _poles(loop, law, 1.0)
+    unstable = poles[np.abs(poles) >= _UNSTABLE]
+    oscillates = np.any((np.abs(unstable.imag) > 1e-9) | (unstable.real < 0.0))
+    return crossover, 0.0 if oscillates else math.nan
 
 
 def _is_stable(loop: Loop, law: Linear, times: float) -> bool:
     """Whether the closed loop does not diverge, with so many times the gain of the law."""
+    return bool(np.abs(_poles(loop, law, times)).max() < _UNSTABLE)
+
+
+def _poles(loop: Loop, law: Linear, times: float) -> NDArray[np.complex128]:
+    """The poles of the sampled closed loop, with so many times the gain of the law."""
     F, g, H = matrices(loop)
     D, C = times * loop.gain * law.D @ H, times * loop.gain * law.C
     closed = np.block([[F + np.outer(g, D), np.outer(g, C)], [law.B @ H, law.A]])
-    return bool(np.abs(np.linalg.eigvals(closed)).max() < _UNSTABLE)
+    return np.asarray(np.linalg.eigvals(closed), np.complex128)

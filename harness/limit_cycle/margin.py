@@ -92,7 +92,8 @@ def _following(loop: Loop, sweep: Sweep | None, with_cycle: bool) -> Following:
 def _judged(loop: Loop) -> tuple[Crossover | None, float, str]:
     """Crossover and margin, and why the margin is unknown (NaN); empty where it is known."""
     if law := linearised(loop):
-        return *crossing_and_margin(loop, law), ""
+        crossing, margin = crossing_and_margin(loop, law)
+        return crossing, margin, "linearised, the loop diverges without an oscillation" if math.isnan(margin) else ""
     crossing = crossover(loop)
     try:
         return crossing, gain_margin(loop, crossing.gain if crossing else None), ""

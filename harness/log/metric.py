@@ -274,7 +274,7 @@ _METRICS = (
     Metric(
         name="chatters",
         unit=YES_OR_NO,
-        meaning="true if a limit cycle is detected; null if gusts may mask one or the judged window is below 30 s",
+        meaning="true if a limit cycle is detected; null if undecided: gusts, below 0.2 Hz, or a window below 30 s",
         measure=lambda signals: signals.chatters,
         heading="limit cycle",
         of_circling=True,
