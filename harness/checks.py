@@ -159,6 +159,8 @@ def airframe_of(name: str) -> Path:
         if aircraft.is_folder(name):
             must = f"{name}: the folder must hold airframe.toml and a JSBSim model, {Path(name).name}.xml"
             raise ValueError(must) from None
+        if name.endswith(".toml"):
+            raise ValueError(f"{name}: there is no such file") from None
         known = aircraft.names()
         allowed = f"must be one of {', '.join(known)}, a folder, or a file of harness assess --fit"
         raise ValueError(f"is {shown(name)}, {allowed}{did_you_mean(name, known)}") from None

@@ -22,7 +22,12 @@ def contents(flight: RecordedFlight) -> Iterator[str]:
     yield f"clock: {flight.clock}; times in s since the log's first row"
     yield ""
     yield from table(HEADINGS, rows(flight), "lrrrrrl")
-    yield ""
+    remarks = list(_remarks(flight))
+    if remarks:
+        yield from ("", *remarks)
+
+
+def _remarks(flight: RecordedFlight) -> Iterator[str]:
     for event in flight.events:
         yield f"at {event.time:.1f} s: {event.text}"
     if flight.failure:
