@@ -29,13 +29,12 @@ def linearised(loop: Loop) -> Linear | None:
 
 
 def has_memory(loop: Loop) -> bool:
-    """Whether the loop's law declares a memory, or answers otherwise when it was asked before."""
-    if isinstance(started(loop.law, loop.context), Remembering):
-        return True
+    """Whether the loop's law declares a memory, or answers otherwise when it was asked before. Raises `LawFailed`."""
     e = np.linspace(-0.01, 0.02, _TRIED)
     r = np.linspace(0.3, -0.2, _TRIED)
     alone = [loop.commands(e[i : i + 1], r[i : i + 1])[0] for i in range(_TRIED)]
-    return bool(loop.commands(e, r).tolist() != alone)
+    answers_otherwise = loop.commands(e, r).tolist() != alone
+    return bool(answers_otherwise or isinstance(started(loop.law, loop.context), Remembering))
 
 
 def crossing_and_margin(loop: Loop, law: Linear) -> tuple[Crossover | None, float]:
