@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._flying import flying
+
 if TYPE_CHECKING:
     from harness.search.falsify import Falsification
 
@@ -34,19 +36,8 @@ _MOST_LINES = 5  # largest number of lines of the table of the worst
     show_default=True,
     help="Random seed of the search; flights keep their own.",
 )
-@click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
-@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
-@click.option(
-    "--retry",
-    type=click.Choice(["failed"]),
-    help="Fly invalid flights again; timed-out flights and dead workers always are.",
-)
-@click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
-)
-@click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the text.")
+@flying
 def falsify(
     file: Path,
     over: tuple[str, ...],

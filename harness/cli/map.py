@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._flying import flying
+
 if TYPE_CHECKING:
     from harness.search.map import Map
 
@@ -36,18 +38,7 @@ _PICTURES = ("map.png", PICTURE)
     metavar="N",
     help="At most N flights.  [default: a tenth of the full grid's, or four times the lattice's]",
 )
-@click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
-@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
-@click.option(
-    "--retry",
-    type=click.Choice(["failed"]),
-    help="Fly invalid flights again; timed-out flights and dead workers always are.",
-)
-@click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
-)
-@click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
+@flying
 def map_(
     file: Path,
     across: str,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._flying import flying
 from harness.cli._paths import PATH
-from harness.cli._setting import SETTING
 
 if TYPE_CHECKING:
     from harness.runs.matrix import Shard
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("file", type=PATH)
 @click.option("--out", type=PATH, help="The folder of the results; required without --dry-run.")
-@click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
-@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
 @click.option("--limit", type=click.IntRange(1), metavar="N", help="Fly the first N flights of the matrix only.")
 @click.option(
     "--shard", metavar="I/N", help="Fly the I-th of N parts, each on a machine of its own; see harness merge."
@@ -30,24 +28,8 @@ if TYPE_CHECKING:
     type=click.Choice(["all", "sample", "failed", "none"]),
     help="Which flights are recorded, in OUT/flights. [default: all up to 50 flights, else sample]",
 )
-@click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    type=SETTING,
-    metavar="KEY=VALUE",
-    help="Set a key, or several values of it; repeatable.",
-)
-@click.option(
-    "--retry",
-    type=click.Choice(["failed"]),
-    help="Fly invalid flights again; timed-out flights and dead workers always are.",
-)
-@click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
-)
-@click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
 @click.option("--dry-run", is_flag=True, help="Print the size of the matrix, its warnings and the time it takes.")
+@flying
 def run(
     file: Path,
     out: Path | None,

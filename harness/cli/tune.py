@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from harness.cli._flying import flying
+
 if TYPE_CHECKING:
     from harness.requirement import Requirement
     from harness.search.tune import Tuning
@@ -46,18 +48,7 @@ _MOST_LINES = 30  # largest number of lines of a front
     show_default=True,
     help="Random seed of the search; flights keep their own.",
 )
-@click.option("--workers", type=click.IntRange(0, 1024), help="Processes; 0: this one. [default: one per processor]")
-@click.option("--dask", metavar="SCHEDULER", help="Fly on a Dask cluster: the address or the file of its scheduler.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key for all flights; repeatable.")
-@click.option(
-    "--retry",
-    type=click.Choice(["failed"]),
-    help="Fly invalid flights again; timed-out flights and dead workers always are.",
-)
-@click.option(
-    "--engine", type=click.Choice(["python", "compiled"]), help="Simulation engine. [default: compiled if faster]"
-)
-@click.option("--flight-timeout", type=float, metavar="S", help="End a flight that hangs for S s. [default: 60]")
+@flying
 def tune(
     file: Path,
     over: tuple[str, ...],
