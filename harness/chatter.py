@@ -34,7 +34,6 @@ class Oscillation(NamedTuple):
     frequency: float  # Hz
     heading_rate: float  # amplitude of the flown heading rate, rad/s
     command: float  # amplitude of its command, rad/s
-    correlation: float  # autocorrelation of the flown heading rate at a lag of `REMEMBERED` cycles
 
 
 def oscillation(command: Array, flown: Array, period: float) -> Oscillation | None:
@@ -49,10 +48,8 @@ def oscillation(command: Array, flown: Array, period: float) -> Oscillation | No
     frequency = _strongest(y, period, slowest)
     cycle = 1.0 / (frequency * period)  # samples
     amplitude, swing = _amplitude(y, cycle), _amplitude(u, cycle)
-    lags = range(math.floor((REMEMBERED - 0.5) * cycle), math.ceil((REMEMBERED + 0.5) * cycle) + 1)
-    correlation = max(_correlation(y, lag) for lag in lags)
-    chatters = False if swing < VISIBLE else True if correlation >= LEAST_CORRELATION else None
-    return Oscillation(chatters, frequency, amplitude, swing, correlation)
+    chatters = False if swing < VISIBLE else True if _keeps_phase(y, cycle) else None
+    return Oscillation(chatters, frequency, amplitude, swing)
 
 
 def rests(command: Array, flown: Array, period: float) -> bool:
@@ -119,6 +116,12 @@ def _amplitude(x: Array, cycle: float) -> float:
     count = max(2, round(cycle))
     whole = x[: len(x) // count * count].reshape(-1, count)
     return float(np.ptp(whole, axis=1).mean()) / 2.0
+
+
+def _keeps_phase(x: Array, cycle: float) -> bool:
+    """Whether a record is like itself `REMEMBERED` cycles of so many samples later, half a cycle more or less."""
+    lags = range(math.floor((REMEMBERED - 0.5) * cycle), math.ceil((REMEMBERED + 0.5) * cycle) + 1)
+    return any(_correlation(x, lag) >= LEAST_CORRELATION for lag in lags)
 
 
 def _correlation(x: Array, lag: int) -> float:

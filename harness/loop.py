@@ -141,7 +141,7 @@ def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | NDArray[n
     """
     x_r, y_r = log["north"] - log["target_north"], log["east"] - log["target_east"]
     log["range_error"][:] = np.sqrt(x_r * x_r + y_r * y_r) - log.flight.law.standoff  # the arithmetic of the laws
-    wind, velocity = (np.column_stack([log[f"{of}_north"], log[f"{of}_east"]]) for of in ("wind", "target_velocity"))
+    wind, velocity = (log.table[:, i : i + 2] for i in map(COLUMNS.index, ("wind_north", "target_velocity_north")))
     log["feasibility_margin"][:] = margins_in_flight(log.flight, wind, velocity)
     seen = log.table[:, COLUMNS.index(SEEN_COLUMNS[0]) :]
     if estimates is None:

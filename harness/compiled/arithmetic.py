@@ -21,6 +21,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 nan, inf, minus_inf = math.nan, math.inf, -math.inf
 _PREFIX = "standoff_harness_"
+_DOUBLE = ir.DoubleType()
+_PURE = ("nounwind", "readnone")  # of a function: equal calls are one
 
 
 def jit(function: Function) -> Function:
@@ -29,16 +31,24 @@ def jit(function: Function) -> Function:
     return made
 
 
+def _known_to_the_compiler(name: str) -> str:
+    """The name in compiled code of the C library's function of this name."""
+    address = ctypes.cast(getattr(ctypes.CDLL(None), name), ctypes.c_void_p).value
+    llvmlite.binding.add_symbol(_PREFIX + name, address)
+    return _PREFIX + name
+
+
 def _of_library(name: str, arguments: int) -> Any:
     """The C library's function of this name, of so many floats, to be called in compiled code."""
-    library = ctypes.CDLL(None)
-    address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-    llvmlite.binding.add_symbol(_PREFIX + name, address)
+    symbol = _known_to_the_compiler(name)
     signature = types.float64(*[types.float64] * arguments)
 
     def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()] * arguments)
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, _PREFIX + name), values)
+        kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * arguments)
+        function = cgutils.get_or_insert_function(builder.module, kind, symbol)
+        for attribute in _PURE:
+            function.attributes.add(attribute)
+        return builder.call(function, values)
 
     if arguments == 1:
 
@@ -71,11 +81,33 @@ def _one(name: str) -> Any:
     return checked
 
 
-sin, cos, tan = _one("sin"), _one("cos"), _one("tan")
+def _of_finite(name: str) -> Any:
+    """The same of a function that is finite for every number that is."""
+    of_library = _of_library(name, 1)
+
+    @jit
+    def checked(x: float) -> float:
+        if math.isinf(x):
+            raise ValueError("math domain error")
+        y: float = of_library(x)
+        return y
+
+    return checked
+
+
+@jit
+def sqrt(x: float) -> float:
+    """`math.sqrt`: every processor rounds a root correctly."""
+    if x < 0.0:
+        raise ValueError("math domain error")
+    return math.sqrt(x)
+
+
+sin, cos = _of_finite("sin"), _of_finite("cos")
+tan = _one("tan")
 asin, acos, atan = _one("asin"), _one("acos"), _one("atan")
 sinh, cosh, tanh = _one("sinh"), _one("cosh"), _one("tanh")
 exp, expm1, log, log1p = _one("exp"), _one("expm1"), _one("log"), _one("log1p")
-sqrt = _one("sqrt")
 _atan2, _pow = _of_library("atan2", 2), _of_library("pow", 2)
 _remainder, _fmod = _of_library("remainder", 2), _of_library("fmod", 2)
 

@@ -54,19 +54,13 @@ def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
     """A function compiled, and what it is called with last: the numbers that it holds. Raises `NotCompiledError`."""
     try:
         shape, numbers = held(function)
-        hash(shape)
+        found = _KERNELS.get(shape)
     except NotLiftedError as error:
         raise NotCompiledError(str(error)) from None
     except (TypeError, ValueError) as error:  # it holds what has no hash, or nothing yet
         raise NotCompiledError(f"what it holds cannot be compared: {error}") from None
-    if shape not in _KERNELS:
-        try:
-            _KERNELS[shape] = _loaded(function)
-        except NotLiftedError as error:
-            _KERNELS[shape] = str(error)
-        except Exception as error:  # a full disk, a Numba that does not start: Python flies all the same
-            _KERNELS[shape] = f"no kernel can be made: {type(error).__name__}: {error}"
-    found = _KERNELS[shape]
+    if found is None:
+        found = _KERNELS[shape] = _made(function)
     if isinstance(found, str):
         raise NotCompiledError(found)
     return found, (numbers,) if numbers else ()
@@ -75,6 +69,16 @@ def kernel(function: Any) -> tuple[Kernel, tuple[Any, ...]]:
 def refuse(function: Any, why: str) -> None:
     """The kernel of this function is not used any more."""
     _KERNELS[held(function)[0]] = why
+
+
+def _made(function: Any) -> Kernel | str:
+    """The kernel of a function; or why there is none."""
+    try:
+        return _loaded(function)
+    except NotLiftedError as error:
+        return str(error)
+    except Exception as error:  # a full disk, a Numba that does not start: Python flies all the same
+        return f"no kernel can be made: {type(error).__name__}: {error}"
 
 
 def _loaded(function: Any) -> Kernel:

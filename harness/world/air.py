@@ -70,10 +70,11 @@ class Air:
         `horizontal` with the velocity down at each period, m/s, and the way in each part, m: of shapes (count + 1, 3)
         and (count * len(parts), 2).
         """
-        velocity, way = np.empty((count + 1, 3)), np.empty((count, len(parts), 2))
-        velocity[:], way[:] = (*self.steady, 0.0), np.multiply.outer(parts, self.steady)
+        steady = np.array([*self.steady, 0.0]) + 0.0  # minus zero is zero, as in `horizontal` and `drift`
+        velocity = np.tile(steady, (count + 1, 1))
+        way = np.tile(np.multiply.outer(parts, steady[:2]), (count, 1))
         if len(self.gusts):
             steps = np.concatenate([[0], np.cumsum(np.tile([round(part / self.step) for part in parts], count))])
             velocity += self.gusts[steps[:: len(parts)]]
-            way += np.diff(self._way[steps], axis=0).reshape(way.shape)
-        return velocity + 0.0, way.reshape(-1, 2) + 0.0  # minus zero is zero, as in `horizontal` and `drift`
+            way += np.diff(self._way[steps], axis=0)
+        return velocity, way
