@@ -48,8 +48,25 @@ class Estimate(NamedTuple):
     target_velocity_east_variance: float
 
 
+class Fix(NamedTuple):
+    """The target as a filter knows it at a measurement: its state, and of each axis the covariance. SI, north-east."""
+
+    x: float
+    x_dot: float
+    y: float
+    y_dot: float
+    P_xx: float
+    P_xx_dot: float
+    P_x_dot_x_dot: float
+    P_yy: float
+    P_yy_dot: float
+    P_y_dot_y_dot: float
+
+
 class TargetFilter(Protocol):
-    """The filter of one flight: `update` at every measurement, `miss` at a lost one, `at` in between."""
+    """The filter of one flight: `update` at every measurement, `miss` at a lost one; `fix` is what it knows then."""
+
+    fix: Fix
 
     def update(self, measured: Measurement) -> Measurement:
         """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
@@ -57,10 +74,6 @@ class TargetFilter(Protocol):
 
     def miss(self) -> None:
         """Moves on by a period whose measurement was lost. The first measurement never is."""
-        ...
-
-    def at(self, age: float) -> Estimate:
-        """The estimate `age` s after the latest measurement, or the latest lost one."""
         ...
 
 
@@ -129,6 +142,24 @@ class Estimator:
             raise ValueError(f"the estimator {self.kind!r} has no filter")
         return start(self)
 
+    def ahead(self, fix: Fix, age: Any) -> Estimate:
+        """The estimate `age` s after a fix: at constant velocity, and with the share of Q for that time.
+
+        Arrays of fixes and ages give arrays, with the bits of each alone.
+        """
+        share = age / self.period
+        q, q_dot = share * self.process_position_variance, share * self.process_velocity_variance
+        return Estimate(
+            fix.x + age * fix.x_dot,
+            fix.y + age * fix.y_dot,
+            fix.x_dot,
+            fix.y_dot,
+            fix.P_xx + age * (2.0 * fix.P_xx_dot + age * fix.P_x_dot_x_dot) + q,
+            fix.P_yy + age * (2.0 * fix.P_yy_dot + age * fix.P_y_dot_y_dot) + q,
+            fix.P_x_dot_x_dot + q_dot,
+            fix.P_y_dot_y_dot + q_dot,
+        )
+
 
 def ekf(settings: Estimator) -> "Tracker":
     """The paper's extended Kalman filter before its first measurement."""
@@ -147,14 +178,13 @@ class Tracker:
 
     def __init__(self, settings: Estimator, kalman: Any) -> None:
         self.kalman = kalman  # filterpy's, which has no types: x, P, y and mahalanobis are those of the latest update
-        self._settings = settings
-        self._x: list[float] = []
-        self._P: list[list[float]] = []
+        self.fix: Fix
+        self._settings, self._begins = settings, True
 
     def update(self, measured: Measurement) -> Measurement:
         """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
         kalman, sensor, innovation = self.kalman, self._settings.sensor_position, Measurement(math.nan, math.nan)
-        begins = not self._x
+        begins, self._begins = self._begins, False
         if begins:
             kalman.x, kalman.P = initial(self._settings, measured)
         else:
@@ -171,23 +201,8 @@ class Tracker:
         self._keep()
 
     def _keep(self) -> None:
-        self._x, self._P = self.kalman.x[:, 0].tolist(), self.kalman.P.tolist()
-
-    def at(self, age: float) -> Estimate:
-        """The estimate `age` s after the latest period: constant velocity, and the share of Q for that time."""
-        (x, x_dot, y, y_dot), P, s = self._x, self._P, self._settings
-        share = age / s.period
-        q, q_dot = share * s.process_position_variance, share * s.process_velocity_variance
-        return Estimate(
-            x + age * x_dot,
-            y + age * y_dot,
-            x_dot,
-            y_dot,
-            P[0][0] + age * (2.0 * P[0][1] + age * P[1][1]) + q,
-            P[2][2] + age * (2.0 * P[2][3] + age * P[3][3]) + q,
-            P[1][1] + q_dot,
-            P[3][3] + q_dot,
-        )
+        (x, x_dot, y, y_dot), P = self.kalman.x[:, 0].tolist(), self.kalman.P.tolist()
+        self.fix = Fix(x, x_dot, y, y_dot, P[0][0], P[0][1], P[1][1], P[2][2], P[2][3], P[3][3])
 
 
 def initial(s: Estimator, measured: Measurement) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.estimator import Estimator, Measurement, measurement
+from autopilot.estimator import Estimate, Estimator, Fix, Measurement, measurement
 from harness.flight import Flight
 from harness.plants.plant import End, Outcome
 from harness.plants.state import State
@@ -16,6 +16,7 @@ from harness.world.target import Target, TargetState
 
 NO_MEASUREMENT = Measurement(math.nan, math.nan)
 _AHEAD = 1000  # guidance steps that the filter works ahead
+_ESTIMATED = len(Estimate._fields)
 
 
 class Instruments:
@@ -76,22 +77,28 @@ def sighting(flight: Flight) -> Sighting:
 class Estimation:
     """The sensor and the filter of one flight: the estimated target at each guidance step.
 
-    `rows` holds one tuple per guidance step, for the log, and for some steps to come: the filter's `Estimate`, then the
-    latest innovation (NaN in a step without a new measurement). A lost measurement is drawn as well, so that the others
-    keep their noise.
+    A lost measurement is drawn as well, so that the others keep their noise.
     """
 
     def __init__(self, of: Sighting) -> None:
-        self.rows: list[tuple[float, ...]] = []
+        self._of = of
         self._target = of.target.start()  # at any time: measurements may fall between two guidance steps
         self._measure, self._filter = sensor(of.estimator, of.seed), of.estimator.start()
         self._is_lost = losses(of.estimator, of.seed)
-        self._step, self._period = of.step, of.estimator.period
         self._steps_per_guidance = round(of.guidance_period / of.step)
         self._steps_per_measurement = round(of.estimator.period / of.step)
-        self._last = of.periods
+        self._fixes: list[Fix] = []  # at each measurement so far, with the lost ones
+        self._innovations: list[Measurement] = []
+        self._table, self._made = np.empty((of.periods + 1, _ESTIMATED + len(Measurement._fields))), 0
         self._end: End | None = None  # how the filter ended, after the last of the rows
-        self._measurements = 0  # due so far, with the lost ones; the next one has this number
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """A row per guidance step, for the log, and for some steps to come.
+
+        The filter's `Estimate`, then the latest innovation: NaN in a step without a new measurement.
+        """
+        return self._table[: self._made]
 
     def at(self, k: int, truth: TargetState) -> TargetState:
         """The estimated target at the k-th guidance step, after all measurements due by then; SI, rad, north-east.
@@ -100,41 +107,60 @@ class Estimation:
         not used: the sensor measures at its own instants, counted in simulation steps. Raises `End` when the filter
         fails or diverges: that is an outcome of the flight.
         """
-        if k >= len(self.rows) and self._end is None:
+        if k >= self._made and self._end is None:
             self._work_ahead(k)
-        if k >= len(self.rows) and self._end:
+        if k >= self._made and self._end:
             raise self._end
-        return TargetState(*self.rows[k][:4])
+        return TargetState(*self._table[k, :4].tolist())
 
     def _work_ahead(self, k: int) -> None:
         """Makes the rows up to the k-th and some more, until the flight or the filter ends.
 
         No aircraft is in them. In turn with JSBSim, which takes the processor's cache, a filter takes twice the time.
         """
+        begin, end = self._made, min(k + _AHEAD, self._of.periods) + 1
         try:
-            for row in range(len(self.rows), min(k + _AHEAD, self._last) + 1):
-                self.rows.append(self._row(row))
-        except End as end:
-            self._end = end
-
-    def _row(self, k: int) -> tuple[float, ...]:
-        now, innovation = k * self._steps_per_guidance, NO_MEASUREMENT
-        try:
-            while self._measurements * self._steps_per_measurement <= now:
-                time = self._measurements * self._period
-                measured = self._measure(self._target(time))
-                if self._is_lost(time) and self._measurements:
-                    self._filter.miss()
-                else:
-                    innovation = self._filter.update(measured)
-                self._measurements += 1
-            age = (now - (self._measurements - 1) * self._steps_per_measurement) * self._step
-            estimate = self._filter.at(age)
+            while self._row_of(len(self._fixes)) < end:
+                self._take(len(self._fixes))
         except Exception as error:
-            raise End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}") from error
-        if not all(map(math.isfinite, estimate)):
-            raise End(Outcome.INVALID, "the estimator diverged: a number of its estimate is not finite")
-        return (*estimate, *innovation)
+            self._end = End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}")
+            end = self._row_of(len(self._fixes))
+        if begin < end:
+            self._fill(begin, end)
+
+    def _row_of(self, measurement: int) -> int:
+        """The first guidance step that is not before this measurement."""
+        return -(-measurement * self._steps_per_measurement // self._steps_per_guidance)
+
+    def _take(self, number: int) -> None:
+        """Takes the measurement of this number."""
+        time, innovation = number * self._of.estimator.period, NO_MEASUREMENT
+        measured = self._measure(self._target(time))
+        if self._is_lost(time) and number:
+            self._filter.miss()
+            if self._row_of(number) == self._row_of(number - 1):
+                innovation = self._innovations[-1]
+        else:
+            innovation = self._filter.update(measured)
+        self._fixes.append(self._filter.fix)
+        self._innovations.append(innovation)
+
+    def _fill(self, begin: int, end: int) -> None:
+        """Fills these rows, up to the first whose estimate is not finite."""
+        now = np.arange(begin, end) * self._steps_per_guidance
+        latest = now // self._steps_per_measurement
+        is_new = latest > (now - self._steps_per_guidance) // self._steps_per_measurement
+        age = (now - latest * self._steps_per_measurement) * self._of.step
+        with np.errstate(over="ignore", invalid="ignore"):
+            fixes = Fix._make(np.array(self._fixes)[latest].T)
+            estimate = np.column_stack(self._of.estimator.ahead(fixes, age))
+        self._table[begin:end, :_ESTIMATED], self._table[begin:end, _ESTIMATED:] = estimate, math.nan
+        self._table[begin:end][is_new, _ESTIMATED:] = np.array(self._innovations)[latest[is_new]]
+        fails = np.flatnonzero(~np.isfinite(estimate).all(axis=1))
+        if fails.size:
+            end = begin + int(fails[0])
+            self._end = End(Outcome.INVALID, "the estimator diverged: a number of its estimate is not finite")
+        self._made = end
 
 
 def losses(estimator: Estimator, seed: int) -> Callable[[float], bool]:

@@ -2,7 +2,7 @@
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,7 +134,7 @@ def channels_of(told: Mapping[int, Mapping[str, float]], rows: int) -> dict[str,
     return columns
 
 
-def completed(log: FlightLog, estimates: Sequence[tuple[float, ...]] | NDArray[np.float64] | None) -> FlightLog:
+def completed(log: FlightLog, estimates: NDArray[np.float64] | None) -> FlightLog:
     """The log with the columns that the loop does not write: range error, margin, and the target as the law saw it.
 
     `estimates` are the rows of an `Estimation`; None stands for a law that knows the true position and velocity.

@@ -310,7 +310,7 @@ def _estimated(of: Sighting, track: Track | None) -> tuple[Array, Array]:
         last = estimation.at(of.periods, TargetState(0.0, 0.0, 0.0, 0.0))  # the truth is not used
     except End as end:
         raise NotCompiledError(str(end)) from None
-    rows = np.array(estimation.rows)
+    rows = estimation.rows
     seen = np.tile(np.array(last), (len(rows), 1))
     seen[:, :4] = rows[:, :4]  # what no filter estimates is the same throughout
     return seen, rows
