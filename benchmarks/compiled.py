@@ -6,6 +6,7 @@ known, with its journal on two workers, 100 800 flights by kernels and a hundred
 time of all processes; and the first compiled flight of a process, from the cache, in wall time.
 """
 
+import dis
 import os
 import statistics
 import subprocess
@@ -42,6 +43,7 @@ MATRIX = Path("experiments/monte_carlo.toml")
 PAGE = Path("docs/guide/many_flights.md")
 _LIBRARY = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "hypot", "remainder")
 _OF_TWO = ("atan2", "hypot", "remainder", "power")
+_POWER = bytes([dis.opmap["BINARY_OP"], 8])  # x ** y, which calls `pow`
 _FIRST = """
 import time
 from benchmarks.compiled import FLIGHT, engine
@@ -52,10 +54,11 @@ print(time.perf_counter() - begin)
 
 
 class Sped(NamedTuple):
-    """How many times as fast a flight is compiled, in each pair, and what it takes then, ms."""
+    """How many times as fast a flight is compiled, in each pair, and the medians of what it takes, ms."""
 
     ratios: list[float]
     compiled: float
+    python: float
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -97,12 +100,12 @@ def shown(values: list[float]) -> str:
 
 def sped_up(flight: Flight, pairs: int, of: Callable[[Callable[[Flight], FlightLog], Flight], object]) -> Sped:
     """A flight by both engines, in turn."""
-    ratios, quick = [], []
+    plain, quick = [], []
     for _ in range(pairs):
-        plain = seconds(partial(of, loop.simulate, flight))
+        plain.append(1e3 * seconds(partial(of, loop.simulate, flight)))
         quick.append(1e3 * statistics.median(seconds(partial(of, engine.simulate, flight)) for _ in range(5)))
-        ratios.append(1e3 * plain / quick[-1])
-    return Sped(ratios, statistics.median(quick))
+    ratios = [p / q for p, q in zip(plain, quick, strict=True)]
+    return Sped(ratios, statistics.median(quick), statistics.median(plain))
 
 
 def called(flight: Flight) -> Counter[str]:
@@ -113,12 +116,18 @@ def called(flight: Flight) -> Counter[str]:
         if event == "c_call" and function.__module__ == "math" and function.__name__ in _LIBRARY:
             found[function.__name__] += 1
 
-    sys.setprofile(note)
-    try:
-        loop.simulate(flight)
-    finally:
-        sys.setprofile(None)
-    found["power"] = 3 * (flight.periods + 1)  # of `nftsm`: two in Eq. (17), one in Eq. (18)
+    def trace(frame: Any, event: str, value: Any) -> Any:
+        frame.f_trace_opcodes = True
+        if event == "opcode" and frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 2] == _POWER:
+            found["power"] += 1
+        return trace
+
+    for watch, noted in ((sys.setprofile, note), (sys.settrace, trace)):
+        watch(noted)
+        try:
+            loop.simulate(flight)
+        finally:
+            watch(None)
     return found
 
 
@@ -155,6 +164,12 @@ def library_alone(flight: Flight) -> float:
     return took
 
 
+def metrics_alone(flight: Flight) -> float:
+    """What the metrics of a flight take, ms."""
+    log = engine.simulate(flight)
+    return 1e3 * min(seconds(partial(measure, log)) for _ in range(50))
+
+
 def block(pairs: int, seeds: int) -> Iterator[str]:
     """What was measured, in Markdown."""
     yield (
@@ -162,20 +177,27 @@ def block(pairs: int, seeds: int) -> Iterator[str]:
         "range:"
     )
     yield ""
-    rows = {"alone": ["a flight", "45 to 80"], "metrics": ["a flight with its metrics", "20"]}
-    times, library = ["a compiled flight, ms", ""], ["of it calls of the C library, ms", ""]
-    bounds = ["calls of the C library alone", ""]
+    flown, judged = ["a flight", ""], ["a flight with its metrics", "20"]
+    bound, judged_bound = ["calls of the C library alone", ""], ["these calls and the metrics alone", ""]
+    took, library, measuring = (
+        ["a compiled flight, ms", ""],
+        ["of it calls of the C library, ms", ""],
+        ["metrics, ms", ""],
+    )
     for plant in PLANTS:
         flight = replace(FLIGHT, plant=plant)
         assert not engine.why_plain(flight)
-        alone, judged = sped_up(flight, pairs, lambda fly, one: fly(one)), sped_up(flight, pairs, with_metrics)
-        rows["alone"].append(shown(alone.ratios))
-        rows["metrics"].append(shown(judged.ratios))
-        times.append(f"{alone.compiled:.2f}")
-        least = library_alone(flight)
+        alone, both = sped_up(flight, pairs, lambda fly, one: fly(one)), sped_up(flight, pairs, with_metrics)
+        flown.append(shown(alone.ratios))
+        judged.append(shown(both.ratios))
+        least, metrics, python = library_alone(flight), metrics_alone(flight), alone.python
+        bound.append(f"{python / least:.0f}")
+        judged_bound.append(f"{(python + metrics) / (least + metrics):.1f}")
+        took.append(f"{alone.compiled:.2f}")
         library.append(f"{least:.2f}")
-        bounds.append(f"{statistics.median(alone.ratios) * alone.compiled / least:.0f}")
-    yield from markdown(["", "asked", *(f"`{plant}`" for plant in PLANTS)], [*rows.values(), bounds, times, library])
+        measuring.append(f"{metrics:.2f}")
+    rows = [flown, bound, judged, judged_bound, took, library, measuring]
+    yield from markdown(["", "asked", *(f"`{plant}`" for plant in PLANTS)], rows)
     yield ""
     with tempfile.TemporaryDirectory() as folder:
         plain = run_of(Path(folder) / "python", max(1, seeds // 100), compiled=False)

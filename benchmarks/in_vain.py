@@ -35,7 +35,7 @@ _SEEN = Observation(
 
 _BY_HAND = (
     "**Sine and cosine in one call** of the C library (`sincos`) take 9.4 ns in place of 15.7, a tenth of a compiled "
-    "flight on `lagged`. They had the same bits at 2e9 random angles, but no standard says so. (A program in C, once.)",
+    "flight on `lagged`. Of 1e9 random angles none had other bits, but 1.6762650767948966 rad has. (By hand, once.)",
     "**Divisions that are not checked** (Numba's `error_model`) save 1 to 2 % of a compiled flight, and a law that "
     "divides by zero would go on. (By hand, once.)",
     "**Several of JSBSim's properties in one call**: its Python package has no such call.",

@@ -126,7 +126,7 @@ def _connect(fdm: Fdm, connected: bool) -> None:
     write(fdm, "actuators/engaged", float(connected))
 
 
-_READ = (
+READ = (
     "position/from-start-neu-n-ft",
     "position/from-start-neu-e-ft",
     "velocities/v-north-fps",
@@ -267,7 +267,7 @@ aircraft was trimmed, m/s, each north and east, and the step, s."""
 
 
 def state_of(read: Sequence[float], before: float, frame: Frame) -> State:
-    """The state, from the values of `_READ`; `before` is the heading one step ago: the rate is the mean over it."""
+    """The state, from the values of `READ`; `before` is the heading one step ago: the rate is the mean over it."""
     (
         n, e, v_n, v_e, V, phi, p, h, v_d, theta, psi, q, r, phi_c, alpha, beta, N_y, N_z,
         aileron, elevator, rudder, throttle, gust_x, gust_y, gust_z,
@@ -295,7 +295,7 @@ class SixDofFlying:
 
     def __init__(self, fdm: Fdm, step: float, start: Start, air: Air, stall: float, stepper: Stepper) -> None:
         self.fdm, self.stall = fdm, stall
-        self.readers = [node(fdm, name).get_double_value for name in _READ]
+        self.readers = [node(fdm, name).get_double_value for name in READ]
         self.frame: Frame = (*start.position, *air.steady, *air.horizontal(0), step)
         self._run: Callable[[], bool] = fdm.run
         self._step = stepper
