@@ -7,7 +7,7 @@ Z_k+1), and arctan(y/x) is atan2(y, x).
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, NamedTuple, Protocol
@@ -48,25 +48,10 @@ class Estimate(NamedTuple):
     target_velocity_east_variance: float
 
 
-class Fix(NamedTuple):
-    """The target as a filter knows it at a measurement: its state, and of each axis the covariance. SI, north-east."""
-
-    x: float
-    x_dot: float
-    y: float
-    y_dot: float
-    P_xx: float
-    P_xx_dot: float
-    P_x_dot_x_dot: float
-    P_yy: float
-    P_yy_dot: float
-    P_y_dot_y_dot: float
-
-
 class TargetFilter(Protocol):
-    """The filter of one flight: `update` at every measurement, `miss` at a lost one; `fix` is what it knows then."""
+    """The filter of one flight: `update` at every measurement, `miss` at a lost one, `ahead` in between."""
 
-    fix: Fix
+    known: tuple[float, ...]  # what it knows since then, in numbers of its own: all that `ahead` computes with
 
     def update(self, measured: Measurement) -> Measurement:
         """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
@@ -74,6 +59,13 @@ class TargetFilter(Protocol):
 
     def miss(self) -> None:
         """Moves on by a period whose measurement was lost. The first measurement never is."""
+        ...
+
+    def ahead(self, known: Sequence[Any], age: Any) -> Estimate:
+        """The estimate `age` s after a measurement, lost or not, at which this was known.
+
+        Numbers, or arrays of them, one for each of many moments; the array has the bits of each number alone.
+        """
         ...
 
 
@@ -142,24 +134,6 @@ class Estimator:
             raise ValueError(f"the estimator {self.kind!r} has no filter")
         return start(self)
 
-    def ahead(self, fix: Fix, age: Any) -> Estimate:
-        """The estimate `age` s after a fix: at constant velocity, and with the share of Q for that time.
-
-        Arrays of fixes and ages give arrays, with the bits of each alone.
-        """
-        share = age / self.period
-        q, q_dot = share * self.process_position_variance, share * self.process_velocity_variance
-        return Estimate(
-            fix.x + age * fix.x_dot,
-            fix.y + age * fix.y_dot,
-            fix.x_dot,
-            fix.y_dot,
-            fix.P_xx + age * (2.0 * fix.P_xx_dot + age * fix.P_x_dot_x_dot) + q,
-            fix.P_yy + age * (2.0 * fix.P_yy_dot + age * fix.P_y_dot_y_dot) + q,
-            fix.P_x_dot_x_dot + q_dot,
-            fix.P_y_dot_y_dot + q_dot,
-        )
-
 
 def ekf(settings: Estimator) -> "Tracker":
     """The paper's extended Kalman filter before its first measurement."""
@@ -178,13 +152,13 @@ class Tracker:
 
     def __init__(self, settings: Estimator, kalman: Any) -> None:
         self.kalman = kalman  # filterpy's, which has no types: x, P, y and mahalanobis are those of the latest update
-        self.fix: Fix
-        self._settings, self._begins = settings, True
+        self.known: tuple[float, ...] = ()
+        self._settings = settings
 
     def update(self, measured: Measurement) -> Measurement:
         """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""
         kalman, sensor, innovation = self.kalman, self._settings.sensor_position, Measurement(math.nan, math.nan)
-        begins, self._begins = self._begins, False
+        begins = not self.known
         if begins:
             kalman.x, kalman.P = initial(self._settings, measured)
         else:
@@ -201,8 +175,25 @@ class Tracker:
         self._keep()
 
     def _keep(self) -> None:
-        (x, x_dot, y, y_dot), P = self.kalman.x[:, 0].tolist(), self.kalman.P.tolist()
-        self.fix = Fix(x, x_dot, y, y_dot, P[0][0], P[0][1], P[1][1], P[2][2], P[2][3], P[3][3])
+        P = self.kalman.P.tolist()
+        self.known = (*self.kalman.x[:, 0].tolist(), P[0][0], P[0][1], P[1][1], P[2][2], P[2][3], P[3][3])
+
+    def ahead(self, known: Sequence[Any], age: Any) -> Estimate:
+        """At constant velocity, with the share of Q for that time."""
+        x, x_dot, y, y_dot, P_00, P_01, P_11, P_22, P_23, P_33 = known
+        s = self._settings
+        share = age / s.period
+        q, q_dot = share * s.process_position_variance, share * s.process_velocity_variance
+        return Estimate(
+            x + age * x_dot,
+            y + age * y_dot,
+            x_dot,
+            y_dot,
+            P_00 + age * (2.0 * P_01 + age * P_11) + q,
+            P_22 + age * (2.0 * P_23 + age * P_33) + q,
+            P_11 + q_dot,
+            P_33 + q_dot,
+        )
 
 
 def initial(s: Estimator, measured: Measurement) -> tuple[Array, Array]:

@@ -81,15 +81,14 @@ def _closed_form(S: Array) -> Array:
 def _filtered(inverse: Callable[[Array], Array] | None) -> list[Estimate]:
     """The estimates of a filter with this inverse; of filterpy's own without one."""
     draw = np.random.default_rng(1)
-    settings = Estimator(kind="ekf")
-    tracker = settings.start()
+    tracker = Estimator(kind="ekf").start()
     assert isinstance(tracker, Tracker)
     if inverse:
         tracker.kalman = _Lean(tracker.kalman, inverse)
     found = []
     for r, azimuth in (draw.standard_normal((_UPDATES, 2)) * (1.0, 0.1) + (100.0, 0.3)).tolist():
         tracker.update(Measurement(r, azimuth))
-        found.append(settings.ahead(tracker.fix, 0.1))
+        found.append(tracker.ahead(tracker.known, 0.1))
     return found
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.estimator import Estimate, Estimator, Fix, Measurement, measurement
+from autopilot.estimator import Estimate, Estimator, Measurement, measurement
 from harness.flight import Flight
 from harness.plants.plant import End, Outcome
 from harness.plants.state import State
@@ -87,7 +87,7 @@ class Estimation:
         self._is_lost = losses(of.estimator, of.seed)
         self._steps_per_guidance = round(of.guidance_period / of.step)
         self._steps_per_measurement = round(of.estimator.period / of.step)
-        self._fixes: list[Fix] = []  # at each measurement so far, with the lost ones
+        self._known: list[tuple[float, ...]] = []  # by the filter, at each measurement so far, with the lost ones
         self._innovations: list[Measurement] = []
         self._table, self._made = np.empty((of.periods + 1, _ESTIMATED + len(Measurement._fields))), 0
         self._end: End | None = None  # how the filter ended, after the last of the rows
@@ -120,13 +120,14 @@ class Estimation:
         """
         begin, end = self._made, min(k + _AHEAD, self._of.periods) + 1
         try:
-            while self._row_of(len(self._fixes)) < end:
-                self._take(len(self._fixes))
+            while self._row_of(len(self._known)) < end:
+                self._take(len(self._known))
         except Exception as error:
-            self._end = End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}")
-            end = self._row_of(len(self._fixes))
-        if begin < end:
-            self._fill(begin, end)
+            self._end, end = _raised(error), self._row_of(len(self._known))
+        try:
+            self._made = self._filled(begin, end) if begin < end else end
+        except Exception as error:
+            self._end = _raised(error)
 
     def _row_of(self, measurement: int) -> int:
         """The first guidance step that is not before this measurement."""
@@ -142,25 +143,29 @@ class Estimation:
                 innovation = self._innovations[-1]
         else:
             innovation = self._filter.update(measured)
-        self._fixes.append(self._filter.fix)
+        self._known.append(self._filter.known)
         self._innovations.append(innovation)
 
-    def _fill(self, begin: int, end: int) -> None:
-        """Fills these rows, up to the first whose estimate is not finite."""
-        now = np.arange(begin, end) * self._steps_per_guidance
-        latest = now // self._steps_per_measurement
-        is_new = latest > (now - self._steps_per_guidance) // self._steps_per_measurement
-        age = (now - latest * self._steps_per_measurement) * self._of.step
+    def _filled(self, begin: int, end: int) -> int:
+        """Fills these rows up to the first whose estimate is not finite, and gives its number, or `end`."""
+        now, each = np.arange(begin, end) * self._steps_per_guidance, self._steps_per_measurement
+        latest = now // each
+        is_new = latest > (now - self._steps_per_guidance) // each
+        age, known = (now - latest * each) * self._of.step, np.array(self._known)[latest].T
         with np.errstate(over="ignore", invalid="ignore"):
-            fixes = Fix._make(np.array(self._fixes)[latest].T)
-            estimate = np.column_stack(self._of.estimator.ahead(fixes, age))
-        self._table[begin:end, :_ESTIMATED], self._table[begin:end, _ESTIMATED:] = estimate, math.nan
-        self._table[begin:end][is_new, _ESTIMATED:] = np.array(self._innovations)[latest[is_new]]
+            estimate = np.stack(np.broadcast_arrays(*self._filter.ahead([*known], age), age)[:-1], axis=1)
+        rows = self._table[begin:end]
+        rows[:, :_ESTIMATED], rows[:, _ESTIMATED:] = estimate, NO_MEASUREMENT
+        rows[is_new, _ESTIMATED:] = np.array(self._innovations)[latest[is_new]]
         fails = np.flatnonzero(~np.isfinite(estimate).all(axis=1))
-        if fails.size:
-            end = begin + int(fails[0])
-            self._end = End(Outcome.INVALID, "the estimator diverged: a number of its estimate is not finite")
-        self._made = end
+        if not fails.size:
+            return end
+        self._end = End(Outcome.INVALID, "the estimator diverged: a number of its estimate is not finite")
+        return begin + int(fails[0])
+
+
+def _raised(error: Exception) -> End:
+    return End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}")
 
 
 def losses(estimator: Estimator, seed: int) -> Callable[[float], bool]:

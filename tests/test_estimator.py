@@ -54,7 +54,7 @@ def test_a_target_at_the_sensor_leaves_the_filter_finite() -> None:
     assert not linearised(column(3.0, 0.0, -4.0, 0.0), 3.0, -4.0).any()
     tracker = ekf(replace(PAPER, initial_position=(0.0, 0.0)))
     tracker.update(Measurement(0.3, 1.0))
-    assert all(map(math.isfinite, PAPER.ahead(tracker.fix, 0.5)))
+    assert all(map(math.isfinite, tracker.ahead(tracker.known, 0.5)))
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-3.1, 3.1), st.integers(-3, 3))
@@ -75,7 +75,7 @@ def test_exact_measurements_of_a_constant_velocity_bring_the_truth(
     for k in range(600):
         x, y = (p + v * 0.5 * k for p, v in zip(start, velocity, strict=True))
         tracker.update(measurement(x, y, 0.0, 0.0))
-    assert PAPER.ahead(tracker.fix, 0.0)[:4] == pytest.approx((x, y, *velocity), abs=1e-3)
+    assert tracker.ahead(tracker.known, 0.0)[:4] == pytest.approx((x, y, *velocity), abs=1e-3)
 
 
 def test_the_start_from_a_measurement_has_its_noise_along_and_across() -> None:
@@ -98,7 +98,7 @@ def started(settings: Estimator, updates: int) -> Tracker:
 
 def test_a_period_after_the_measurement_the_estimate_is_the_filters_own_prediction() -> None:
     tracker = started(PAPER, 10)
-    after = PAPER.ahead(tracker.fix, PAPER.period)
+    after = tracker.ahead(tracker.known, PAPER.period)
     tracker.kalman.predict()
     assert after[:4] == pytest.approx(tracker.kalman.x[[0, 2, 1, 3], 0])
     assert after[4:] == pytest.approx(tracker.kalman.P.diagonal()[[0, 2, 1, 3]])
@@ -106,7 +106,7 @@ def test_a_period_after_the_measurement_the_estimate_is_the_filters_own_predicti
 
 def test_between_measurements_the_estimate_moves_at_constant_velocity() -> None:
     tracker = started(PAPER, 5)
-    now, later = PAPER.ahead(tracker.fix, 0.0), PAPER.ahead(tracker.fix, 0.35)
+    now, later = tracker.ahead(tracker.known, 0.0), tracker.ahead(tracker.known, 0.35)
     assert later[2:4] == now[2:4]
     assert later[0] - now[0] == pytest.approx(0.35 * now[2])
     assert later[1] - now[1] == pytest.approx(0.35 * now[3])
@@ -260,7 +260,7 @@ def test_of_several_measurements_in_a_guidance_period_all_count() -> None:
     tracker, measure, at = ekf(often), sensor(often, 0), MOVING.start()
     for j in range(200 + 1):
         last = tracker.update(measure(at(j * 0.1)))
-    assert log.table[-1, COLUMNS.index("target_north_seen") :].tolist() == [*often.ahead(tracker.fix, 0.0), *last]
+    assert log.table[-1, COLUMNS.index("target_north_seen") :].tolist() == [*tracker.ahead(tracker.known, 0.0), *last]
 
 
 def test_a_measurement_period_must_fit_the_guidance_period_and_the_step() -> None:

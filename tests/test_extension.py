@@ -115,13 +115,14 @@ ENTRIES = {  # file: what stands there, and what is written before it
             "class Raw:\n"
             '    """Every measurement is believed."""\n\n'
             "    def update(self, measured: Measurement) -> Measurement:\n"
-            "        r, azimuth = self._measured = measured\n"
+            "        r, azimuth = measured\n"
+            "        self.known = (r * math.cos(azimuth), r * math.sin(azimuth))\n"
             "        return Measurement(0.0, 0.0)\n\n"
             "    def miss(self) -> None:\n"
             "        pass\n\n"
-            "    def at(self, age: float) -> Estimate:\n"
-            "        r, azimuth = self._measured\n"
-            "        return Estimate(r * math.cos(azimuth), r * math.sin(azimuth), 0.0, 0.0, 1.0, 1.0, 1.0, 1.0)\n\n\n",
+            "    def ahead(self, known: Sequence[Any], age: Any) -> Estimate:\n"
+            "        x, y = known\n"
+            "        return Estimate(x, y, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0)\n\n\n",
         ),
         ('        "ekf": EstimatorKind(', '        "raw": EstimatorKind("as measured", lambda settings: Raw()),\n'),
     ),
