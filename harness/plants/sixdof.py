@@ -4,7 +4,7 @@ In this order: trimming a model, engaging its inner loop, flying it.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 GROUND = 15.0  # m above the ground: a flight ends below it
 DEPARTURE_BANK = math.radians(80.0)
+_AT_ONCE = 1000  # steps whose gusts are turned into Python's numbers at once
 STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
 _NO_ERRORS = Errors()
@@ -237,11 +238,14 @@ def _in_gusts(fdm: Fdm, air: Air) -> Stepper:
     height, heading = (node(fdm, name).get_double_value for name in ("position/h-sl-ft", "attitude/psi-rad"))
     (shear_x, shear_y), level = air.shear, air.altitude / FT
     met_x, met_y, _ = air.gust(0)
-    table = np.column_stack([(air.gusts - (met_x, met_y, 0.0)) / FT, air.rotation(FT * fdm["metrics/bw-ft"])])
-    blocks = (
-        table[k : k + 1000].tolist() for k in range(0, len(table), 1000)
-    )  # in blocks: as lists, the whole table would take four times its memory
-    rows = chain.from_iterable(blocks)
+    gusts, rotation = air.gusts, air.rotation(FT * fdm["metrics/bw-ft"])
+
+    def block(k: int) -> Iterator[tuple[float, ...]]:
+        """The numbers of some steps from the k-th on; those of a whole flight take four times the memory of arrays."""
+        apart = (gusts[k : k + _AT_ONCE] - (met_x, met_y, 0.0)) / FT
+        return zip(*apart.T.tolist(), *rotation[k : k + _AT_ONCE].T.tolist(), strict=True)
+
+    rows = chain.from_iterable(map(block, range(0, len(gusts), _AT_ONCE)))
     sin, cos, is_sheared = math.sin, math.cos, bool(shear_x or shear_y)
 
     def step(steps: int, run: Callable[[], object]) -> None:
