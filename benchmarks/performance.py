@@ -194,7 +194,9 @@ def calls_alone(flight: Flight) -> float:
             kalman.update(Measurement(100.0, 0.3))
         air = air_of(again)
         table = np.column_stack([air.gusts, air.rotation(1.0)])[:, :6]
-        rows = chain.from_iterable(table[k : k + 1000].tolist() for k in range(0, len(table), 1000))
+        rows = chain.from_iterable(
+            zip(*table[k : k + 1000].T.tolist(), strict=True) for k in range(0, len(table), 1000)
+        )
         for rate in commands[1:]:
             give(rate)
             for W_x, W_y, W_z, p, q, r in islice(rows, steps):

@@ -13,10 +13,12 @@ import pytest
 import aircraft
 from harness import loop
 from harness.adoption import adopt as adopting
+from harness.adoption import stages as of_adoption
 from harness.adoption.adoption import Adoption, Wish
 from harness.adoption.adoption import write as write_files
 from harness.adoption.model import named, source
 from harness.adoption.refusal import RefusalError
+from harness.adoption.stages import STAGES
 from harness.flight import air_of
 from harness.plants.identified import identified, is_stale
 from harness.plants.model import data_root
@@ -176,7 +178,7 @@ def test_an_aircraft_that_is_not_identified_is_adopted_without_the_plants_betwee
     adopted: tuple[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = shutil.copytree(adopted[1], tmp_path / "c172p")
-    monkeypatch.setattr(adopting, "_identify", not_identified)
+    monkeypatch.setattr(adopting, "identifying", not_identified)
     said = invoke("adopt", "c172p", "--out", tmp_path)
     assert said.exit_code == 0, said.output
     assert "identify   without lagged and coordinated: a manoeuvre ended in departed: bank of 80 deg\n" in said.output
@@ -266,7 +268,7 @@ def refused_below_50(adoption: Adoption) -> tuple[Adoption, str]:
 def test_an_aircraft_that_cannot_be_flown_in_its_first_trim_is_tried_in_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(adopting, "STAGES", {**adopting.STAGES, "design": refused_below_50})
+    monkeypatch.setattr(adopting, "STAGES", {**STAGES, "design": refused_below_50})
     stages = adopting.adopt("c172p", tmp_path, Wish())
     assert ("design", "no bank loop is stable: at another airspeed") in iter(stages)
     assert next(line for stage, line in stages if stage == "trim").startswith("51.")
@@ -331,9 +333,9 @@ def test_a_model_too_slow_to_fly_is_refused_at_its_load(tmp_path: Path, monkeypa
     folder.mkdir()
     adoption = Adoption(name="c172p", wish=Wish(), folder=folder, names=frozenset(named(model.root)), writers={})
     write_files(adoption, model)
-    monkeypatch.setattr(adopting, "_SLOWEST", 0.0)
+    monkeypatch.setattr(of_adoption, "_SLOWEST", 0.0)
     with pytest.raises(RefusalError, match=r"load: a step takes .* ms to compute, may take 0 ms"):
-        adopting.STAGES["load"](adoption)
+        STAGES["load"](adoption)
     monkeypatch.setattr(adopting, "LOADING", 0.01)
     with pytest.raises(RefusalError, match=r"load: not done after 0\.01 s"):
         found_up_to("load", "c172p", tmp_path / "out")

@@ -19,7 +19,8 @@ from autopilot.standoff import mirrored
 from harness import loop
 from harness.compiled import arithmetic, engine
 from harness.compiled import kernel as kernels
-from harness.compiled.lifted import NotLiftedError, held, module_of
+from harness.compiled.closure import NotLiftedError, held
+from harness.compiled.lifted import module_of
 from harness.flight import Flight, MetricSettings
 from harness.flight_errors import Errors
 from harness.log import FlightLog

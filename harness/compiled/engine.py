@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from autopilot.guidance import Remembering
 from autopilot.response import Delay, Piece
 from harness import loop
+from harness.compiled.closure import NotLiftedError, form
 from harness.compiled.kernel import Kernel, NotCompiledError, is_installed, kernel, refuse
-from harness.compiled.lifted import NotLiftedError, form
 from harness.compiled.loop import (
     COMPLETED,
     NOT_FLYING,

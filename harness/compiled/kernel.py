@@ -12,7 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from harness.compiled.lifted import NotLiftedError, Shape, held, module_of
+from harness.compiled.closure import NotLiftedError, Shape, held
+from harness.compiled.lifted import module_of
 from harness.files import content_hash, replacing
 from harness.provenance import processor
 

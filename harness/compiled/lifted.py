@@ -10,18 +10,14 @@ import ast
 import builtins
 import copy
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
-from functools import lru_cache
-from pathlib import Path
-from types import CodeType, FunctionType, MethodType, ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, cast
 
 from autopilot.guidance import Guidance, Telling, telling
 from autopilot.response import dot
+from harness.compiled.closure import Closure, NotLiftedError, Shape, closure_of, held, is_record
+from harness.compiled.source import node_of
 
-Shape = tuple[Any, ...]  # of what a function holds: its code and module, then for each name what kind of thing it is
-_NUMBERS = (float, int, bool)
 _BUILTINS = {"abs", "len", "range", "float", "int", "bool", "enumerate", "zip"}
 _ARITHMETIC = {
     getattr(math, name): name
@@ -42,72 +38,6 @@ _REFUSED = {
     ast.Try: "it catches errors",
     ast.With: "it has a context manager",
 }
-
-
-class NotLiftedError(Exception):
-    """The function cannot be lifted; the message says why."""
-
-
-class _Function(NamedTuple):
-    """A function and what it holds by name: the cells of its closure, and the object of a method."""
-
-    function: Any
-    held: Mapping[str, Any]
-
-
-def _parts(function: Any) -> _Function:
-    if isinstance(function, MethodType) and isinstance(function.__func__, FunctionType):
-        inner = _parts(function.__func__)
-        return _Function(inner.function, {inner.function.__code__.co_varnames[0]: function.__self__, **inner.held})
-    if not isinstance(function, FunctionType):
-        raise NotLiftedError(f"{function!r} is no function of Python")
-    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-    return _Function(function, {name: cell.cell_contents for name, cell in cells})
-
-
-def held(function: Any) -> tuple[Shape, tuple[Any, ...]]:
-    """The shape of what a function holds, and the numbers in it. Raises `NotLiftedError`."""
-    of, kept = _parts(function)
-    shape, values = [], []
-    for name, value in kept.items():
-        kind, numbers = _kind(name, value)
-        shape.append((name, *kind))
-        if numbers is not None:
-            values.append(numbers)
-    module = of.__globals__.get("__name__")  # of a law of one's own by its content: equal code may mean other constants
-    return ((of.__code__, module), *shape), tuple(values)
-
-
-def _kind(name: str, value: Any) -> tuple[tuple[Any, ...], Any]:
-    """What kind of thing a function holds, and the numbers in it; None without."""
-    kind = type(value)
-    if kind in _NUMBERS:
-        return ("number", kind), value
-    if value is None or kind is str:
-        return ("constant", value), None
-    if kind is FunctionType or kind is MethodType:
-        shape, numbers = held(value)
-        return ("function", shape), numbers or None
-    if kind is tuple and value:
-        return ("tuple", form(f"it holds {name}, which is", value)), value
-    if _is_record(kind) and all(type(x) in _NUMBERS for x in value):
-        return ("record", kind.__name__, kind._fields), tuple(value)
-    if is_dataclass(value) and kind.__dataclass_params__.frozen:
-        own = {f.name: getattr(value, f.name) for f in fields(value) if type(getattr(value, f.name)) in _NUMBERS}
-        return ("record", kind.__name__, tuple(own)), tuple(own.values())
-    if callable(value) or isinstance(value, ModuleType):
-        return ("constant", value), None
-    raise NotLiftedError(f"it holds {name}, which is {kind.__name__}")
-
-
-def form(what: str, value: Any) -> Any:
-    """The type of a number, or of a tuple the forms of all in it. Raises `NotLiftedError`, which says what it is of."""
-    kind = type(value)
-    if kind in _NUMBERS:
-        return kind
-    if kind is not tuple:
-        raise NotLiftedError(f"{what} {kind.__name__}")
-    return tuple(form(what, each) for each in value)
 
 
 class Module(NamedTuple):
@@ -140,8 +70,8 @@ class _Lifting:
         """The name in the module of a function."""
         shape, _ = held(function)
         if shape not in self._names:
-            of = _parts(function)
-            node = _node(of.function.__code__)
+            of = closure_of(function)
+            node = node_of(of.function.__code__)
             name = self._names[shape] = f"f{len(self._names)}_{_plain(of.function.__name__)}"
             self.texts.append(_Writer(self, of, node, shape).text(name))
         return self._names[shape]
@@ -170,7 +100,7 @@ class _Lifting:
 class _Writer(ast.NodeTransformer):
     """Writes one function of the module."""
 
-    def __init__(self, lifting: _Lifting, of: _Function, node: ast.FunctionDef | ast.Lambda, shape: Shape) -> None:
+    def __init__(self, lifting: _Lifting, of: Closure, node: ast.FunctionDef | ast.Lambda, shape: Shape) -> None:
         self._lifting, self._of, self._node = lifting, of, copy.deepcopy(node)
         self._kinds = {name: tuple(kind) for name, *kind in shape[1:]}
         code = of.function.__code__
@@ -181,7 +111,7 @@ class _Writer(ast.NodeTransformer):
         self._records = {}  # the named tuple that a parameter is annotated with, by its name
         for argument in self._node.args.args:
             of_type = self._looked_up(argument.annotation)
-            if _is_record(of_type):
+            if is_record(of_type):
                 self._records[argument.arg] = of_type
 
     def text(self, name: str) -> str:
@@ -255,9 +185,9 @@ class _Writer(ast.NodeTransformer):
                 if math.isfinite(value)
                 else _arithmetic({math.inf: "inf", -math.inf: "minus_inf"}.get(value, "nan"))
             )
-        if isinstance(value, tuple) and not _is_record(type(value)):
+        if isinstance(value, tuple) and not is_record(type(value)):
             return ast.Tuple([self._constant(x) for x in value], ast.Load())
-        if _is_record(value):
+        if is_record(value):
             return _name(self._lifting.record(value.__name__, value._fields))
         if value in _ARITHMETIC:
             return _arithmetic(_ARITHMETIC[value])
@@ -311,7 +241,7 @@ class _Writer(ast.NodeTransformer):
             (of,) = node.args
             values: list[ast.expr] = of.elts if isinstance(of, ast.Tuple) else [ast.Starred(of, ast.Load())]
             return self._record(record, values, [])
-        if _is_record(what):
+        if is_record(what):
             return self._record(what, node.args, node.keywords)
         if node.keywords:
             raise NotLiftedError(f"{self._of.function.__name__} names arguments in a call")
@@ -450,53 +380,7 @@ def _is_ours(function: FunctionType) -> bool:
     return function.__globals__.get("__name__", "").partition(".")[0] in ("harness", "autopilot")
 
 
-def _is_record(value: Any) -> bool:
-    """Whether it is the class of a named tuple."""
-    return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
-
-
 def _is_made(value: Any) -> Any:
     """The named tuple whose `_make` it is, or None."""
     owner = getattr(value, "__self__", None)
-    return owner if getattr(value, "__name__", "") == "_make" and _is_record(owner) else None
-
-
-def _node(code: CodeType) -> ast.FunctionDef | ast.Lambda:
-    """The function of this code in its file. Raises `NotLiftedError` where the file has changed since."""
-    try:
-        tree, codes = _read(code.co_filename, Path(code.co_filename).stat().st_mtime_ns)
-    except (OSError, SyntaxError, ValueError) as error:
-        raise NotLiftedError(f"{code.co_filename}: {error}") from None
-    if code not in codes:
-        raise NotLiftedError(f"{code.co_filename} has changed since it was loaded")
-    begin = min((line, column) for line, _, column, _ in _positions(code))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and node.name == code.co_name:
-            if min(node.lineno, *(n.lineno for n in node.decorator_list), node.lineno) == code.co_firstlineno:
-                return node
-        elif isinstance(node, ast.Lambda) and code.co_name == "<lambda>":
-            body = node.body
-            if (body.lineno, body.col_offset) <= begin <= (body.end_lineno or 0, body.end_col_offset or 0):
-                return node
-    raise NotLiftedError(f"{code.co_name} is not found in {code.co_filename}")
-
-
-def _positions(code: CodeType) -> Iterator[tuple[int, int, int, int]]:
-    """Where the instructions of a code stand."""
-    for line, end_line, column, end_column in code.co_positions():
-        if line and end_line and column is not None and end_column:
-            yield line, end_line, column, end_column
-
-
-@lru_cache(maxsize=64)
-def _read(file: str, changed: int) -> tuple[ast.Module, frozenset[CodeType]]:
-    """A file as it is now: its tree, and all codes in it."""
-    text = Path(file).read_bytes()
-    return ast.parse(text, file), frozenset(_codes(compile(text, file, "exec")))
-
-
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for inner in code.co_consts:
-        if isinstance(inner, CodeType):
-            yield from _codes(inner)
+    return owner if getattr(value, "__name__", "") == "_make" and is_record(owner) else None

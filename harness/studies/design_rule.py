@@ -18,10 +18,10 @@ import aircraft
 from autopilot.laws import law
 from autopilot.rules import RuleError
 from harness import tables
-from harness.adoption.adopt import STAGES
 from harness.adoption.adoption import STEP, Adoption, Wish, write
 from harness.adoption.manoeuvres import Turned, turned
 from harness.adoption.model import named, source, writers
+from harness.adoption.stages import STAGES
 from harness.child import MEMORY, limited
 from harness.files import write_text
 from harness.flight import Flight
