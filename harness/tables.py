@@ -108,7 +108,10 @@ def counted(count: int, noun: str) -> str:
 
 
 def number(value: float | bool | None, scale: float = 1.0) -> str:
-    """`scale` times the value with three significant digits; a dash for none, and yes or no for a truth value."""
+    """`scale` times the value with three significant digits; a dash for none, and yes or no for a truth value.
+
+    What is below 0.0005 is 0: in the units of the tables nobody measures it.
+    """
     if value is None or math.isnan(value):
         return "-"
     if isinstance(value, bool):

@@ -10,22 +10,8 @@ import aircraft
 from harness.loop import simulate
 from harness.plants.identified import identified
 from harness.plants.lagged import Lagged
-from harness.studies.floor import (
-    Autoregression,
-    Circle,
-    Planted,
-    between,
-    checked,
-    error_at,
-    fitted,
-    flight_of,
-    front,
-    held,
-    model,
-    optimal,
-    read_floor,
-    under_law,
-)
+from harness.studies.floor import Planted, checked, flight_of, held, read_floor, under_law
+from harness.studies.floor_model import Autoregression, Circle, between, error_at, fitted, front, model, optimal
 from harness.world.wind import Wind
 from tests.builders import ROOT
 

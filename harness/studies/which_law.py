@@ -18,7 +18,8 @@ from harness.drawing import COLOURS, FAINT, draw
 from harness.margins import Assess
 from harness.runs.comparable import comparable
 from harness.studies.command import out_option, run, write
-from harness.studies.floor import FloorAt, between, read_floor
+from harness.studies.floor import FloorAt, read_floor
+from harness.studies.floor_model import between
 from harness.tables import markdown
 from harness.template import template
 from harness.verdict.pairs import entered, spread
