@@ -51,7 +51,10 @@ class Estimate(NamedTuple):
 class TargetFilter(Protocol):
     """The filter of one flight: `update` at every measurement, `miss` at a lost one, `ahead` in between."""
 
-    known: tuple[float, ...]  # what it knows since then, in numbers of its own: all that `ahead` computes with
+    @property
+    def known(self) -> Sequence[float]:
+        """What it knows since the latest measurement, in numbers of its own: all that `ahead` computes with."""
+        ...
 
     def update(self, measured: Measurement) -> Measurement:
         """Processes the next measurement and returns its innovation; NaN for the one from which the filter starts."""

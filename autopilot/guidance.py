@@ -1,9 +1,7 @@
 """The interface of a guidance law: its observation and its guidance."""
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from inspect import signature
-from types import MethodType
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 if TYPE_CHECKING:
@@ -129,15 +127,7 @@ class Law(Protocol):
 
 def started(law: Law, context: Context) -> LawStep:
     """The law in flight; one whose `start` takes nothing is started without the context."""
-    start = law.start
-    takes = _parameters(start.__func__) > 1 if isinstance(start, MethodType) else _parameters(start) > 0
-    return start(context) if takes else start()  # type: ignore[call-arg]
-
-
-@lru_cache(maxsize=64)
-def _parameters(function: Callable[..., Any]) -> int:
-    """How many parameters a function has."""
-    return len(signature(function).parameters)
+    return law.start(context) if signature(law.start).parameters else law.start()  # type: ignore[call-arg]
 
 
 def uses_response(law: Law) -> bool:

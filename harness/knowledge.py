@@ -107,26 +107,26 @@ class Estimation:
         not used: the sensor measures at its own instants, counted in simulation steps. Raises `End` when the filter
         fails or diverges: that is an outcome of the flight.
         """
-        if k >= self._made and self._end is None:
-            self._work_ahead(k)
+        while self._made <= min(k, self._of.periods) and self._end is None:
+            self._work_ahead()
         if k >= self._made and self._end:
             raise self._end
         return TargetState(*self._table[k, :4].tolist())
 
-    def _work_ahead(self, k: int) -> None:
-        """Makes the rows up to the k-th and some more, until the flight or the filter ends.
+    def _work_ahead(self) -> None:
+        """Makes the next rows, until the flight or the filter ends: in the same blocks, whoever asks for them.
 
         No aircraft is in them. In turn with JSBSim, which takes the processor's cache, a filter takes twice the time.
         """
-        begin, end = self._made, min(k + _AHEAD, self._of.periods) + 1
+        begin, end = self._made, min(self._made + _AHEAD, self._of.periods + 1)
         try:
             while self._row_of(len(self._known)) < end:
                 self._take(len(self._known))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self._end, end = _raised(error), self._row_of(len(self._known))
         try:
             self._made = self._filled(begin, end) if begin < end else end
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self._end = _raised(error)
 
     def _row_of(self, measurement: int) -> int:
@@ -142,8 +142,11 @@ class Estimation:
             if self._row_of(number) == self._row_of(number - 1):
                 innovation = self._innovations[-1]
         else:
-            innovation = self._filter.update(measured)
-        self._known.append(self._filter.known)
+            innovation = Measurement._make(self._filter.update(measured))
+        known = tuple(self._filter.known)
+        if len(known) != len(self._known[0] if self._known else known):
+            raise ValueError(f"known has {len(known)} numbers now, and had {len(self._known[0])}")
+        self._known.append(known)
         self._innovations.append(innovation)
 
     def _filled(self, begin: int, end: int) -> int:
@@ -151,12 +154,14 @@ class Estimation:
         now, each = np.arange(begin, end) * self._steps_per_guidance, self._steps_per_measurement
         latest = now // each
         is_new = latest > (now - self._steps_per_guidance) // each
-        age, known = (now - latest * each) * self._of.step, np.array(self._known)[latest].T
-        with np.errstate(over="ignore", invalid="ignore"):
-            estimate = np.stack(np.broadcast_arrays(*self._filter.ahead([*known], age), age)[:-1], axis=1)
+        age, first = (now - latest * each) * self._of.step, latest[0]
+        known = np.array(self._known[first:], dtype=np.float64)[latest - first].T
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            numbers = Estimate._make(self._filter.ahead([*known], age))
+            estimate = np.stack(np.broadcast_arrays(*numbers, age)[:-1], axis=1, dtype=np.float64)
         rows = self._table[begin:end]
         rows[:, :_ESTIMATED], rows[:, _ESTIMATED:] = estimate, NO_MEASUREMENT
-        rows[is_new, _ESTIMATED:] = np.array(self._innovations)[latest[is_new]]
+        rows[is_new, _ESTIMATED:] = np.array(self._innovations[first:])[latest[is_new] - first]
         fails = np.flatnonzero(~np.isfinite(estimate).all(axis=1))
         if not fails.size:
             return end
@@ -164,7 +169,7 @@ class Estimation:
         return begin + int(fails[0])
 
 
-def _raised(error: Exception) -> End:
+def _raised(error: BaseException) -> End:
     return End(Outcome.INVALID, f"the estimator raised {type(error).__name__}: {error}")
 
 

@@ -1,10 +1,12 @@
 """Compiled flights: the same bits as Python's, the reasons for which a flight is left to Python, and the choice."""
 
+import ast
 import math
 import os
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ from harness.compiled import arithmetic, engine
 from harness.compiled import kernel as kernels
 from harness.compiled.closure import NotLiftedError, held
 from harness.compiled.lifted import module_of
+from harness.compiled.variables import mixed, unbound
 from harness.flight import Flight, MetricSettings
 from harness.flight_errors import Errors
 from harness.log import FlightLog
@@ -153,7 +156,7 @@ def test_a_flight_by_compiled_steps_is_watched_row_by_row() -> None:
 
 
 TWO = ("atan2", "copysign", "remainder", "fmod", "hypot", "power")
-ONE = ("sin", "cos", "tan", "asin", "atan", "exp", "log1p", "sqrt", "radians")
+ONE = ("sin", "cos", "tan", "asin", "atan", "exp", "log", "log1p", "sqrt", "radians")
 
 
 @pytest.mark.parametrize("name", [*ONE, *TWO])
@@ -177,6 +180,10 @@ def test_compiled_arithmetic_has_the_bits_of_python_and_raises_where_python_does
             arguments[1] = 2.0  # which a compiler knows as a product
         made = outcome(getattr(arithmetic, name), *arguments)
         assert made == outcome(python, *arguments), arguments
+    others = () if name in ("remainder", "fmod") else (math.inf, -math.inf, math.nan)  # those are left to Python
+    for special in product((0.0, -0.0, 1.0, -1.0, *others), repeat=len(arguments)):
+        made, of_python = (outcome(function, *special) for function in (getattr(arithmetic, name), python))
+        assert made == of_python or (made != made and of_python != of_python), special
 
 
 def test_compiled_sums_have_the_bits_of_python() -> None:
@@ -370,6 +377,51 @@ def test_whole_numbers_that_python_lets_grow_without_limit_are_not_compiled(tmp_
     own(tmp_path, "turns = int(o.north)")
     flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"))
     assert engine.why_plain(flight).endswith("uses 'int'")
+
+
+@pytest.mark.parametrize(
+    ("body", "variable"),
+    [
+        ("if x > 0.0:\n    y = x\nreturn y", "y"),
+        ("if x > 0.0:\n    y = x\nelse:\n    y = -x\nreturn y", ""),
+        ("if x > 0.0:\n    return x\nelse:\n    y = x\nreturn y", ""),
+        ("if (y := x) > 0.0:\n    return x\nreturn y", ""),
+        ("for i in range(3):\n    y = i\nreturn x", ""),
+        ("for i in range(3):\n    y = i\nreturn i", "i"),
+        ("while x < 3.0:\n    x += 1.0\n    y = x\nreturn y", "y"),
+        ("y += x\nreturn y", "y"),
+        ("y: float\nreturn y", "y"),
+        ("z = [y for y in (x, x)]\nreturn y", "y"),
+        ("z = [w for w in (x, x)]\nreturn z[0]", ""),
+    ],
+)
+def test_a_variable_that_may_be_read_without_a_value_is_found(body: str, variable: str) -> None:
+    assert unbound(ast.parse(body).body, {"x", "y", "z", "i"}, {"x"}) == variable
+
+
+@pytest.mark.parametrize(
+    ("body", "variable"),
+    [
+        ("y = 0\nif x > 0.0:\n    y = x", "y"),
+        ("y = 0\ny += 0.5 * x", "y"),
+        ("y = 0.0\ny += 0.5 * x", ""),
+        ("y = 0\nfor i in range(3):\n    y = y + 2 * i", ""),
+        ("y = 0 if x > 0.0 else 1.5", "0 if x > 0.0 else 1.5"),
+        ("y = 0 if x > 0.0 else len(x)\nz = -y", ""),
+        ("y, z = 0, x\nz = y", "z"),
+        ("y = z = x", ""),
+    ],
+)
+def test_a_variable_that_is_a_whole_number_here_and_a_float_there_is_found(body: str, variable: str) -> None:
+    assert mixed(ast.parse(body).body) == variable
+
+
+def test_a_law_that_may_read_a_variable_without_a_value_is_flown_by_python(tmp_path: Path) -> None:
+    """Late in the flight, when Python flies no more beside it."""
+    own(tmp_path, "if o.time < 150.0:\n                q = 1.0\n            q = q + 1.0")
+    flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"), duration=160.0)
+    assert engine.why_plain(flight) == "step: q may be without a value"
+    assert engine.simulate(flight).reason.startswith("the law raised UnboundLocalError")
 
 
 def test_kernels_that_were_not_used_for_long_give_way_to_new_ones(

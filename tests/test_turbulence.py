@@ -312,3 +312,14 @@ def test_it_is_the_limit_of_the_angle_of_attack_that_saves_the_ultra_stick() -> 
 
     assert stalls(1.0) >= 1
     assert stalls(0.21) == 0
+
+
+def test_the_sign_of_a_wind_of_zero_changes_nothing() -> None:
+    """Of equal winds the air is made once, whichever of them comes first."""
+    short, long = (
+        Wind(steady=(zero, 0.0), turbulence="moderate")
+        .start(airspeed=13.0, altitude=150.0, step=0.005, duration=duration, seed=5)
+        .gusts
+        for zero, duration in ((0.0, 7.0), (-0.0, 8.0))
+    )
+    assert np.array_equal(short, long[: len(short)])

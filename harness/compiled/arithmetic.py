@@ -269,9 +269,9 @@ _root = _root_of_two_parts if sys.version_info >= (3, 12) else _root_of_three_pa
 def hypot(x: float, y: float) -> float:
     """`math.hypot`."""
     x, y = abs(x), abs(y)
+    if math.isinf(x) or math.isinf(y):  # also beside what is no number
+        return math.inf
     most = larger(x, y)
-    if math.isinf(most):
-        return most
     if math.isnan(x) or math.isnan(y):
         return math.nan
     if most == 0.0:

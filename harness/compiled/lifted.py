@@ -17,13 +17,14 @@ from autopilot.guidance import Guidance, Telling, telling
 from autopilot.response import dot
 from harness.compiled.closure import Closure, NotLiftedError, Shape, closure_of, held, is_record
 from harness.compiled.source import node_of
+from harness.compiled.variables import mixed, unbound
 
 _BUILTINS = {"abs", "len", "range", "float", "int", "bool", "enumerate", "zip"}
 _ARITHMETIC = {
     getattr(math, name): name
     for name in (
-        "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "expm1", "log1p", "sqrt", "atan2",
-        "copysign", "remainder", "fmod", "hypot", "isfinite", "isnan", "radians", "degrees",
+        "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "expm1", "log", "log1p", "sqrt",
+        "atan2", "copysign", "remainder", "fmod", "hypot", "isfinite", "isnan", "radians", "degrees",
     )
 } | {math.pow: "power", dot: "dot", sum: "added"}  # fmt: skip
 _OURS = "jit(forceinline=True)"
@@ -124,6 +125,12 @@ class _Writer(ast.NodeTransformer):
             for inner in ast.walk(statement):
                 if why := _REFUSED.get(type(inner)):
                     raise NotLiftedError(f"{self._of.function.__name__}: {why}")
+        if variable := unbound(body, self._local, {a.arg for a in [*arguments.posonlyargs, *arguments.args]}):
+            raise NotLiftedError(f"{self._of.function.__name__}: {variable} may be without a value")
+        if variable := mixed(body):
+            raise NotLiftedError(
+                f"{self._of.function.__name__}: {variable} is a whole number here and a float there: write 0.0 for 0"
+            )
         names = [a.arg for a in [*arguments.posonlyargs, *arguments.args] if a.arg not in self._kinds]
         lines: list[str] = []
         if kept := self._kept():

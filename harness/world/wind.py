@@ -78,7 +78,8 @@ def _made(wind: Wind, airspeed: float, altitude: float, step: float, steps: int,
 
         W_x, W_y = wind.steady
         model = dryden(wind.turbulence, airspeed, altitude)
-        field = turbulence(model, math.atan2(W_y, W_x), seed, step, steps)
+        towards = math.atan2(W_y + 0.0, W_x + 0.0)  # of a wind of minus zero as of zero
+        field = turbulence(model, towards, seed, step, steps)
         gusts = gusts + field.velocity[field.lead :]
         rotation = field.rotation if wind.rotation else None
     gusts.setflags(write=False)
