@@ -222,8 +222,8 @@ def least_of_turbulence(flight: Flight, pairs: int) -> str:
         ratios.append(calls_alone(replace(flight, seed=100 + 2 * i)) / bare)
     return (
         "\nA loop that only asks JSBSim, filterpy and NumPy for what the flight with turbulence and EKF asks them for, "
-        f"without law, observation and log, takes {spread(ratios)} times the bare loop. No such flight can take less: "
-        "JSBSim's Python package reads and writes one number at a time."
+        f"without law, observation and log, takes {spread(ratios)} times the bare loop. A flight with "
+        "these calls cannot take less. JSBSim's Python package reads and writes one number at a time."
     )
 
 
