@@ -323,6 +323,46 @@ def test_a_run_that_is_terminated_keeps_its_flights_and_leaves_nothing_behind(tm
     assert len(harness.load_results(tmp_path / "out")) > 0
 
 
+SLOW = """
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from autopilot.guidance import Guidance
+
+
+@dataclass(frozen=True)
+class Slow:
+    standoff: float = 200.0
+    max_heading_rate: float = 0.1
+    command: str = "heading_rate"
+
+    def start(self):
+        def step(o):
+            if o.time > 0.5:
+                Path(__file__).with_name("flying").touch()
+                time.sleep(60.0)
+            return Guidance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+        return step
+
+    def broken_conditions(self, speed_ratio):
+        return []
+"""
+
+
+def test_a_command_that_is_terminated_within_a_law_takes_that_for_no_fault_of_the_law(tmp_path: Path) -> None:
+    write(tmp_path / "slow.py", SLOW)
+    text = KINEMATIC.format(count=1, duration=2.0).replace('"nftsm"\ngains = "paper_1"', '"slow.py:Slow"')
+    file = write(tmp_path / "matrix.toml", text)
+    process = started(file, tmp_path / "out", "--workers", 0)
+    until((tmp_path / "flying").exists, process)
+    process.terminate()
+    told, errors = process.communicate(timeout=20)
+    assert process.returncode == 128 + signal.SIGTERM, told + errors
+    assert not runs_of(tmp_path / "out")
+
+
 @pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
 def test_a_standard_error_that_nobody_can_write_to_loses_no_run(tmp_path: Path, errors: str) -> None:
     line = shlex.join(words_of(*words(settings(tmp_path, count=4), tmp_path / "out")))
@@ -346,11 +386,11 @@ def test_a_second_run_in_a_directory_in_use_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_flight_for_which_there_is_too_little_memory_is_a_row_and_is_flown_again(tmp_path: Path) -> None:
-    """20 000 s at 200 Hz: a log of 2 GB, where a process may have 2.6 GB."""
+    """20 000 s at 200 Hz: a log of 1.7 GB, where a process may have 2 GB."""
     text = KINEMATIC.format(count=1, duration=10.0).replace("[flight]", "[flight]\nguidance_period_s = 0.005")
     file = write(tmp_path / "matrix.toml", f"{text}duration_s = [10.0, 20000.0]\n")
     line = shlex.join(words_of(*words(file, tmp_path / "out")))
-    done = subprocess.run(["sh", "-c", f"ulimit -v 2600000; {line}"], capture_output=True, text=True, check=False)
+    done = subprocess.run(["sh", "-c", f"ulimit -v 2000000; {line}"], capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
     assert "failed: 1 x worker_died: the machine had too little memory for it" in done.stdout
     assert "the same command flies them again" in done.stdout

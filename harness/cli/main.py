@@ -123,11 +123,18 @@ def harness() -> None:
     """
 
 
+class _Terminated(BaseException):
+    """SIGTERM. It is no `SystemExit`, which would count as one of the law that flies just then."""
+
+
+def _terminate(*_: object) -> None:
+    raise _Terminated  # the command ends in order: what was flown is kept
+
+
 def main() -> None:
     """The entry point."""
     guard()
     use_one_thread()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # in order: what was flown is kept
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     if message := in_the_way():
         click.echo(message, err=True)
@@ -139,6 +146,7 @@ def main() -> None:
         sys.exit(2)
     if sys.stdout.isatty():
         WIDTH.set(shutil.get_terminal_size().columns - 2)  # some tables are indented
+    signal.signal(signal.SIGTERM, _terminate)
     try:
         code = harness.main(standalone_mode=False)
     except click.ClickException as error:
@@ -152,6 +160,8 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)
         code = 130
+    except _Terminated:
+        code = 128 + signal.SIGTERM
     sys.exit(code if isinstance(code, int) else 0)
 
 
