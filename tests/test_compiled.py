@@ -404,7 +404,8 @@ def test_a_variable_that_may_be_read_without_a_value_is_found(body: str, variabl
     [
         ("y = 0\nif x > 0.0:\n    y = x", "y"),
         ("y = 0\ny += 0.5 * x", "y"),
-        ("y = 0.0\ny += 0.5 * x", ""),
+        ("y = 0.0\ny += 1", ""),
+        ("y = x\ny = -y + 2", ""),
         ("y = 0\nfor i in range(3):\n    y = y + 2 * i", ""),
         ("y = 0 if x > 0.0 else 1.5", "0 if x > 0.0 else 1.5"),
         ("y = 0 if x > 0.0 else len(x)\nz = -y", ""),

@@ -37,10 +37,10 @@ def mixed(body: Sequence[ast.stmt]) -> str:
                 given.setdefault(name, []).append(ast.BinOp(ast.Name(name, ast.Load()), op, value))
             case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"))):
                 given.setdefault(name, []).append(ast.Constant(0))
-    whole = set(given)
-    while not_whole := {name for name in whole if not any(_is_whole(of, whole) for of in given[name])}:
-        whole -= not_whole
-    for name in whole:
+    whole = set[str]()  # somewhere
+    while more := {name for name in given if any(_is_whole(of, whole) for of in given[name])} - whole:
+        whole |= more
+    for name in sorted(whole):
         if not all(_is_whole(of, whole) for of in given[name]):
             return name
     for node in (node for statement in body for node in ast.walk(statement)):
