@@ -18,7 +18,7 @@ from harness.search.prober import Prober
 from harness.settings import load_flight
 from harness.verdict.statistics import upper_bound
 from tests.builders import command, invoke, words_of, write
-from tests.test_faults import runs_of, until
+from tests.processes import runs_of, until
 
 KINEMATIC = """\
 [flight]

@@ -21,7 +21,7 @@ from harness.search.picture import drawn
 from harness.search.space import Space
 from harness.settings import load_flight, read_settings
 from tests.builders import EXPERIMENTS, HERE, command, invoke, words_of, write
-from tests.test_faults import ended, runs_of, until
+from tests.processes import ended, runs_of, until
 
 BASIN = """\
 question = "From where?"

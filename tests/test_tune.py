@@ -25,7 +25,7 @@ from harness.settings.written import toml
 from harness.world.target import Segment, Target
 from harness.world.wind import Gust, Wind
 from tests.builders import EXPERIMENTS, FLIGHT, HERE, command, invoke, words_of, write
-from tests.test_faults import ended, runs_of, until
+from tests.processes import ended, runs_of, until
 
 KINEMATIC = """\
 question = "How fast?"
