@@ -95,23 +95,11 @@ def heading_from_course(v_a: float, chi_a: float, W_x: float, W_y: float) -> flo
 
 _SLOWEST = 1e-3  # m/s: no airspeed that a law computes with is smaller
 _STANDS_STILL = 1.0 - 1e-6  # wind over airspeed: from here on the aircraft may stand still, where Eq. (3) has no value
-
-
-def _measured_airspeed(o: Observation) -> float:
-    v_a = o.airspeed
-    return _SLOWEST if v_a < _SLOWEST else v_a
-
-
-def _airspeed_over_ground(o: Observation) -> float:
-    v_a = hypot(o.velocity_north - o.wind_north, o.velocity_east - o.wind_east)
-    return _SLOWEST if v_a < _SLOWEST else v_a
-
-
 AIRSPEEDS: Mapping[str, Callable[[Observation], float]] = MappingProxyType(  # the v_a of a law, by its setting
     {
         "nominal": lambda o: o.nominal_airspeed,
-        "measured": _measured_airspeed,
-        "ground": _airspeed_over_ground,
+        "measured": lambda o: max(o.airspeed, _SLOWEST),
+        "ground": lambda o: max(hypot(o.velocity_north - o.wind_north, o.velocity_east - o.wind_east), _SLOWEST),
     }
 )
 _guidance, _observation = Guidance._make, Observation._make  # from a tuple, in half the time of the constructor

@@ -1,7 +1,7 @@
 """Compiled flights beside Python's, in one run: `python -m benchmarks.compiled [PAIRS [SEEDS]]`.
 
 A flight of 100 s of the paper's law on each closed-form plant, alone and with its metrics, in turn, in processor time,
-and the functions of the C library that it calls; a matrix of `experiments/monte_carlo.toml` on these plants, target
+and the functions of `math` that it calls; a matrix of `experiments/monte_carlo.toml` on these plants, target
 known, with its journal on two workers, 100 800 flights by kernels and a hundredth of them by Python, in processor
 time of all processes; and the first compiled flight of a process, from the cache, in wall time.
 """
@@ -16,8 +16,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
+from types import CodeType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +44,11 @@ MATRIX = Path("experiments/monte_carlo.toml")
 PAGE = Path("docs/guide/many_flights.md")
 _LIBRARY = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "hypot", "remainder")
 _OF_TWO = ("atan2", "hypot", "remainder", "power")
-_POWER = bytes([dis.opmap["BINARY_OP"], 8])  # x ** y, which calls `pow`
+_POWER = next(
+    bytes([i.opcode, i.arg or 0])
+    for i in dis.get_instructions(compile("x ** y", "", "eval"))
+    if i.opname == "BINARY_OP"
+)
 _FIRST = """
 import time
 from benchmarks.compiled import FLIGHT, engine
@@ -108,8 +113,15 @@ def sped_up(flight: Flight, pairs: int, of: Callable[[Callable[[Flight], FlightL
     return Sped(ratios, statistics.median(quick), statistics.median(plain))
 
 
+@cache
+def _powers(code: CodeType) -> frozenset[int]:
+    """Where a code has x ** y, which calls `pow`."""
+    text = code.co_code
+    return frozenset(k for k in range(0, len(text), 2) if text[k : k + 2] == _POWER)
+
+
 def called(flight: Flight) -> Counter[str]:
-    """How often a flight calls each function of the C library."""
+    """How often a flight calls each function of `math`, and `pow`."""
     found: Counter[str] = Counter()
 
     def note(frame: Any, event: str, function: Any) -> None:
@@ -117,8 +129,8 @@ def called(flight: Flight) -> Counter[str]:
             found[function.__name__] += 1
 
     def trace(frame: Any, event: str, value: Any) -> Any:
-        frame.f_trace_opcodes = True
-        if event == "opcode" and frame.f_code.co_code[frame.f_lasti : frame.f_lasti + 2] == _POWER:
+        frame.f_trace_opcodes, frame.f_trace_lines = True, False
+        if event == "opcode" and frame.f_lasti in _powers(frame.f_code):
             found["power"] += 1
         return trace
 
@@ -178,10 +190,10 @@ def block(pairs: int, seeds: int) -> Iterator[str]:
     )
     yield ""
     flown, judged = ["a flight", ""], ["a flight with its metrics", "20"]
-    bound, judged_bound = ["calls of the C library alone", ""], ["these calls and the metrics alone", ""]
+    bound, judged_bound = ["functions of `math` alone", ""], ["these and the metrics alone", ""]
     took, library, measuring = (
         ["a compiled flight, ms", ""],
-        ["of it calls of the C library, ms", ""],
+        ["of it functions of `math`, ms", ""],
         ["metrics, ms", ""],
     )
     for plant in PLANTS:

@@ -184,7 +184,8 @@ def calls_alone(flight: Flight) -> float:
     a, b, c, d, e, f = (node(fdm, name).set_double_value for name in (*gusts, *(f"gust/{x}-rad_sec" for x in "pqr")))
     heading, command = node(fdm, "attitude/psi-rad"), node(fdm, "inner-loop/command/heading-rate-rad_s")
     psi, give, run = heading.get_double_value, command.set_double_value, fdm.run
-    readers = [node(fdm, name).get_double_value for name in (*READ, *2 * ("velocities/v-north-fps",) * 2)]
+    # the state, and the velocity north and east for the heading now and a step before
+    readers = [node(fdm, name).get_double_value for name in (*READ, *4 * ("velocities/v-north-fps",))]
     filterings, steps = round(flight.duration / flight.estimator.period), round(flight.guidance_period / flight.step)
     again = replace(flight, seed=flight.seed + 1)  # the air of this one is known by now
 

@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 
 import harness
+from harness.runs.comparable import comparable
+from harness.runs.results import _is_drawn
+from harness.settings.columns import DIRECTORY, DRAWN
 from harness.verdict import grid
 from harness.verdict.answer import change_summary, changes
 from tests.builders import chromium, command, copied_airframe, invoke, result, results, write
@@ -112,8 +115,24 @@ def test_one_seed_of_a_matrix_with_draws_decides_nothing(flown: Path, tmp_path: 
     fixed = EXPERIMENT.replace(
         '"start.heading_deg" = { uniform = [20.0, 60.0] }\nseed = { start = 0, count = 5 }\n', ""
     )
-    words = {row["verdict"] for row in parts(compared(run(tmp_path, fixed)))}
+    without = run(tmp_path, fixed)
+    words = {row["verdict"] for row in parts(compared(without))}
     assert words & {"holds", "fails"}
+    for folders in ((flown, without), (without, flown)):
+        assert comparable(folders, DIRECTORY).flights.attrs[DRAWN]
+
+
+@pytest.mark.parametrize(
+    ("text", "drawn"),
+    [
+        ('[matrix]\n"start.heading_deg" = { "uniform" = [20.0, 60.0] }', True),
+        ('[matrix]\n# "start.heading_deg" = { uniform = [20.0, 60.0] }\nseed = 1', False),
+        ('[[block]]\n"wind.steady_mps" = { speed_mps = 3.0, towards_deg = { uniform = [0.0, 360.0] } }', True),
+    ],
+)
+def test_a_draw_is_found_by_its_form_in_settings_and_commands(text: str, drawn: bool) -> None:
+    assert _is_drawn(text, "harness run a.toml --set law.k2=3 --set=law.name=smc") is drawn
+    assert _is_drawn("", "harness run a.toml --set 'law.k2={uniform=[1, 3]}'")
 
 
 def test_without_the_kinematic_plant_the_lowest_is_the_baseline(tmp_path: Path) -> None:

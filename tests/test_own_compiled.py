@@ -192,6 +192,15 @@ def test_a_power_in_place_is_compiled_with_the_bits_of_python(tmp_path: Path) ->
     assert compiled(flight).digest == loop.simulate(flight).digest
 
 
+def test_a_list_comprehension_is_compiled_with_the_bits_of_python(tmp_path: Path) -> None:
+    own(tmp_path, "q = sum([0.1 * x for x in (o.north, o.east)])")
+    text = (tmp_path / "own.py").read_text().replace("-self.gain * r", "-self.gain * r - 1e-5 * q")
+    write(tmp_path / "own.py", text)
+    flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"))
+    assert not engine.why_plain(flight)
+    assert compiled(flight).digest == loop.simulate(flight).digest
+
+
 def test_whole_numbers_that_python_lets_grow_without_limit_are_not_compiled(tmp_path: Path) -> None:
     own(tmp_path, "turns = int(o.north)")
     flight = replace(FLIGHT, law=harness.law(f"{tmp_path / 'own.py'}:Own"))
@@ -215,7 +224,7 @@ def test_whole_numbers_that_python_lets_grow_without_limit_are_not_compiled(tmp_
     ],
 )
 def test_a_variable_that_may_be_read_without_a_value_is_found(body: str, variable: str) -> None:
-    assert unbound(ast.parse(body).body, {"x", "y", "z", "i"}, {"x"}) == variable
+    assert unbound(ast.parse(body).body, {"w", "x", "y", "z", "i"}, {"x"}) == variable
 
 
 @pytest.mark.parametrize(

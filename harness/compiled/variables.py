@@ -114,12 +114,16 @@ class _Reading:
                 self.unbound = self.unbound or name
 
 
-def _read(node: ast.AST) -> Iterator[str]:
-    for each in ast.walk(node):
-        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load):
-            yield each.id
-        elif isinstance(each, ast.AugAssign) and isinstance(each.target, ast.Name):
-            yield each.target.id
+def _read(node: ast.AST, own: frozenset[str] = frozenset()) -> Iterator[str]:
+    """What is read in a statement, but for the variables of a comprehension, its `own`."""
+    if isinstance(node, ast.ListComp | ast.SetComp | ast.DictComp):
+        own |= {x.id for each in node.generators for x in ast.walk(each.target) if isinstance(x, ast.Name)}
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in own:
+        yield node.id
+    elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+        yield node.target.id
+    for child in ast.iter_child_nodes(node):
+        yield from _read(child, own)
 
 
 def _stored(node: ast.AST) -> frozenset[str]:

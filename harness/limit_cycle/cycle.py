@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.limit_cycle.march import LoopMotion, UnsettledError, settled
-from harness.limit_cycle.prediction import HARMONICS, LimitCycle, Loop, balanced, unknowns
+from harness.limit_cycle.prediction import CANNOT_HOLD, HARMONICS, LimitCycle, Loop, balanced, unknowns
 
 Array = NDArray[np.float64]
 
@@ -19,12 +19,15 @@ def limit_cycle(loop: Loop) -> LimitCycle | None:
     Raises ValueError when the heading-rate limit is below the heading rate of the circle, and `LawFailed`.
     """
     if not loop.holds_circle:
-        raise ValueError("the circle cannot be held: the heading-rate limit is below what it takes")
+        raise ValueError(CANNOT_HOLD)
     try:
         motion = settled(loop)
     except UnsettledError:
         return UNSOLVED
-    return None if motion.rests else balance(loop) or _measured(loop, motion)
+    if motion.rests:
+        return None
+    found = _measured(loop, motion)
+    return _balance(loop, motion, found.frequency, HARMONICS) or found
 
 
 def balance(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
@@ -33,9 +36,14 @@ def balance(loop: Loop, harmonics: int = HARMONICS) -> LimitCycle | None:
     Raises `UnsettledError` and `LawFailed`.
     """
     motion = settled(loop)
-    omega = math.tau * _measured(loop, motion).frequency
-    if motion.rests or omega == 0.0:
+    return None if motion.rests else _balance(loop, motion, _measured(loop, motion).frequency, harmonics)
+
+
+def _balance(loop: Loop, motion: LoopMotion, frequency: float, harmonics: int) -> LimitCycle | None:
+    """The same of a motion at this frequency, Hz."""
+    if frequency == 0.0:
         return None
+    omega = math.tau * frequency
     starts = (_unknowns(loop, motion, omega, count) for count in sorted({harmonics, 1}, reverse=True))
     return balanced(loop, starts, harmonics)
 

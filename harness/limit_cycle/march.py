@@ -26,7 +26,7 @@ _FEWEST, _MOST_PERIODS = 100, 20_000  # guidance periods of a stretch, whatever 
 _STRETCHES = 5  # at most
 _ALIKE = 0.1  # largest relative difference of the command's range between two stretches of a steady motion
 _FACTOR = 4.0  # on the gain, from one step to the next, until the limit cycle begins or ends
-_MOST = 1e3  # times more or less gain: there is no border then
+MOST = 1e3  # times more or less gain: there is no border then
 _EXACT = 1.01  # a border is found to within this factor
 
 
@@ -87,7 +87,7 @@ def marched_margin(loop: Loop) -> float:
     step = _FACTOR if calm else 1.0 / _FACTOR
     while rests(beyond) is calm:
         beyond *= step
-        if not 1.0 / _MOST < beyond < _MOST:
+        if not 1.0 / MOST < beyond < MOST:
             return math.inf if calm else 0.0
     low, high = sorted((beyond / step, beyond))
     while high > _EXACT * low:

@@ -16,7 +16,7 @@ from harness.flight import Flight
 from harness.limit_cycle.cycle import UNSOLVED, limit_cycle
 from harness.limit_cycle.linear import NO_LINEARISATION, crossing_and_margin, has_memory, linearised
 from harness.limit_cycle.march import UnsettledError, marched_margin
-from harness.limit_cycle.prediction import Crossover, LawFailed, LimitCycle, Loop, boundary, crossover
+from harness.limit_cycle.prediction import CANNOT_HOLD, Crossover, LawFailed, LimitCycle, Loop, boundary, crossover
 from harness.plants.identified import IdentifiedError, Sweep, identified
 
 # 1.5 is 3.5 dB. MIL-F-9490D asks 6 dB, a factor of 2, and 45 deg of a flight control system, of what its model leaves
@@ -110,7 +110,7 @@ def _cycle(loop: Loop) -> LimitCycle:
 def _why_unknown(loop: Loop) -> str:
     """Why nothing is predicted of the loop; empty when it is."""
     if not loop.holds_circle:
-        return "the circle cannot be held: the heading-rate limit is below what it takes"
+        return CANNOT_HOLD
     return "" if linearised(loop) or not has_memory(loop) else NO_LINEARISATION
 
 

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HARMONICS = 15
+CANNOT_HOLD = "the circle cannot be held: the heading-rate limit is below what it takes"
 _SAMPLES = 128  # in one cycle
 _SOLVED = 1e-6  # the largest imbalance of a solution, relative to the first harmonic
 _UNKNOWN = (math.nan, math.nan, math.nan)  # heading rate, bank, roll rate: unknown here

@@ -8,7 +8,7 @@ import aircraft
 from autopilot.nftsm import Nftsm
 from autopilot.response import critical_gain
 from harness.flight import Flight
-from harness.limit_cycle.march import UnsettledError, settled
+from harness.limit_cycle.march import MOST, UnsettledError, settled
 from harness.limit_cycle.margin import ENOUGH, Following, following
 from harness.limit_cycle.predicted import unforeseen
 from harness.limit_cycle.prediction import LawFailed, Loop, boundary
@@ -131,7 +131,7 @@ def _word(loop: Following) -> str:
 def _margin(margin: float | None) -> str:
     if margin is None:
         return "unknown"
-    return f"{margin:.3g} (recommended: at least {ENOUGH:g})" if margin else "below 0.001"
+    return f"{margin:.3g} (recommended: at least {ENOUGH:g})" if margin else f"below {1.0 / MOST:g}"
 
 
 def _finite(value: object) -> object:

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 GROUND = 15.0  # m above the ground: a flight ends below it
 DEPARTURE_BANK = math.radians(80.0)
-_AT_ONCE = 1000  # steps whose gusts are turned into Python's numbers at once
+AT_ONCE = 1000  # steps whose gusts are turned into Python's numbers at once
 STALL_TIME = 3.0  # s beyond the stall angle of attack without recovery
 
 _NO_ERRORS = Errors()
@@ -242,10 +242,10 @@ def _in_gusts(fdm: Fdm, air: Air) -> Stepper:
 
     def block(k: int) -> Iterator[tuple[float, ...]]:
         """The numbers of some steps from the k-th on; those of a whole flight take four times the memory of arrays."""
-        apart = (gusts[k : k + _AT_ONCE] - (met_x, met_y, 0.0)) / FT
-        return zip(*apart.T.tolist(), *rotation[k : k + _AT_ONCE].T.tolist(), strict=True)
+        apart = (gusts[k : k + AT_ONCE] - (met_x, met_y, 0.0)) / FT
+        return zip(*apart.T.tolist(), *rotation[k : k + AT_ONCE].T.tolist(), strict=True)
 
-    rows = chain.from_iterable(map(block, range(0, len(gusts), _AT_ONCE)))
+    rows = chain.from_iterable(map(block, range(0, len(gusts), AT_ONCE)))
     sin, cos, is_sheared = math.sin, math.cos, bool(shear_x or shear_y)
 
     def step(steps: int, run: Callable[[], object]) -> None:

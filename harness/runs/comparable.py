@@ -1,8 +1,7 @@
 """The flights of one run, or of several, that may be compared, and the margins that judge them."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,9 +10,9 @@ from harness.margins import Assess
 from harness.runs.journal import StoreError
 from harness.runs.recall import load_laws
 from harness.runs.results import load_results, versions
-from harness.runs.store import last_run
+from harness.runs.store import last_run, overrides_of
 from harness.settings import settings_from_text
-from harness.settings.columns import DIRECTORY
+from harness.settings.columns import DIRECTORY, DRAWN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,10 +48,9 @@ def comparable(folders: Sequence[Path], by: str | None = None, overrides: Sequen
     names = list(map(str, folders))
     if len(set(names)) < len(names):
         raise StoreError(f"{names[0]}: is named twice")
-    flights = pd.concat(
-        [load_results(folder).assign(**{DIRECTORY: name}) for folder, name in zip(folders, names, strict=True)],
-        ignore_index=True,
-    )
+    parts = [load_results(folder).assign(**{DIRECTORY: name}) for folder, name in zip(folders, names, strict=True)]
+    flights = pd.concat(parts, ignore_index=True)
+    flights.attrs[DRAWN] = any(part.attrs[DRAWN] for part in parts)
     if by == DIRECTORY:
         for of, name in zip(known, names, strict=True):
             _refuse_mixed(of, name)
@@ -73,7 +71,8 @@ def _asked(folder: Path, overrides: Sequence[str]) -> tuple[str, Assess]:
     """The question and the margins that the settings and the command line of the last run say."""
     of = last_run(folder)
     where = Path(f"{folder} (its copy of {of['file']})")
-    assess = settings_from_text(of["settings"], where, [*_given(of["words"]), *overrides]).assess()
+    given = [text for text in overrides_of(of["words"]) if text.startswith("assess.")]
+    assess = settings_from_text(of["settings"], where, [*given, *overrides]).assess()
     return str(of["question"] or ""), assess
 
 
@@ -99,11 +98,3 @@ def _warn_of_earlier(folder: Path, of: Mapping[str, Mapping[str, int]]) -> None:
                 UserWarning,
                 stacklevel=3,
             )
-
-
-def _given(words: Sequence[str]) -> Iterator[str]:
-    """The margins that the words of a command set."""
-    for word, following in pairwise([*words, ""]):
-        text = word.removeprefix("--set=") if word.startswith("--set=") else following if word == "--set" else ""
-        if text.strip().startswith("assess."):
-            yield text

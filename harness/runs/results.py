@@ -1,9 +1,11 @@
 """The results of a run as one table: a row per flight, a column per setting and metric."""
 
 import json
-import re
+import shlex
 import sqlite3
+import tomllib
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +14,7 @@ from harness.log.metric import METRICS, YES_OR_NO
 from harness.plants.ladder import PLANTS
 from harness.plants.plant import Outcome
 from harness.runs.journal import JOURNAL, StoreError, reading, state
-from harness.runs.store import last_run
+from harness.runs.store import last_run, overrides_of
 from harness.settings.columns import DRAWN, by_column, is_setting
 from harness.settings.law_source import FILES
 
@@ -28,7 +30,6 @@ _NEEDED: Mapping[str, Collection[str]] = {  # what each flight has, and which th
     "plant": PLANTS, "outcome": [outcome.value for outcome in Outcome], "law.name": (), "aircraft": (),
 }  # fmt: skip
 _STATE = b"journal_state"  # in the Parquet file's metadata: the `state` of the journal that was exported
-_DRAW = re.compile(r"\b(uniform|normal)\s*=")  # a value that is drawn from the seed, in settings or a command
 
 
 def load_results(folder: Path | str) -> "pd.DataFrame":
@@ -62,8 +63,26 @@ def load_results(folder: Path | str) -> "pd.DataFrame":
         if unknown := [value for value in values if not (isinstance(value, str) and value in (known or [value]))]:
             why = f"{unknown[0]}, which this harness does not know" if known else f"{unknown[0]}, must be text"
             raise StoreError(f"{folder / JOURNAL}: cannot be used: the {name} of a flight is {why}")
-    results.attrs[DRAWN] = any(_DRAW.search(f"{settings} {command}") for settings, command in runs)
+    results.attrs[DRAWN] = any(_is_drawn(str(settings), str(command)) for settings, command in runs)
     return results
+
+
+def _is_drawn(settings: str, command: str) -> bool:
+    """Whether settings, or a command with its `--set`, name a value that is drawn from the seed."""
+    texts = [settings]
+    with suppress(ValueError):  # a damaged command names none
+        texts += [f"value = {text.partition('=')[2]}" for text in overrides_of(shlex.split(command))]
+    for text in texts:
+        with suppress(tomllib.TOMLDecodeError):  # a bare word is no draw
+            if _holds_draw(tomllib.loads(text)):
+                return True
+    return False
+
+
+def _holds_draw(value: object) -> bool:
+    if isinstance(value, dict):
+        return set(value) in ({"uniform"}, {"normal"}) or any(map(_holds_draw, value.values()))
+    return isinstance(value, list) and any(map(_holds_draw, value))
 
 
 def export(folder: Path, to: Path | None = None) -> None:

@@ -5,7 +5,8 @@ import os
 import shlex
 import sqlite3
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -244,6 +245,15 @@ def last_run(folder: Path) -> Mapping[str, Any]:
         if not isinstance(latest["settings"], str):
             raise TypeError("the settings of the latest run are no text")
         return {**latest, "words": shlex.split(str(latest["command"]))}
+
+
+def overrides_of(words: Sequence[str]) -> Iterator[str]:
+    """The KEY=VALUE of each `--set` in the words of a command."""
+    for word, following in pairwise([*words, ""]):
+        if word.startswith("--set="):
+            yield word.removeprefix("--set=").strip()
+        elif word == "--set":
+            yield following.strip()
 
 
 def _latest_run(journal: sqlite3.Connection) -> dict[str, Any] | None:

@@ -87,18 +87,18 @@ def keys_of(table: SettingsTable) -> Iterator[SettingsKey]:
     elsewhere = schema_of(table.inherited).settings if table.inherited else {}
     given = {field.name: field.default for field in fields(table.kind)}
     for key, setting in schema_of(table.kind).settings.items():
-        meaning = about(table.kind, setting.name).text
-        if key in elsewhere or key == "gains" or not meaning:  # a table without a meaning has an entry
+        meaning = about(table.kind, setting.name)
+        if key in elsewhere or key == "gains" or not meaning.text:  # a table without a meaning has an entry
             continue
         default = "(of the set)" if elsewhere else _default(setting, given[setting.name])
         choices = get_args(setting.kind) if get_origin(setting.kind) is Literal else ()
         yield SettingsKey(
             key,
-            UNITS[setting.unit.suffix] or about(table.kind, setting.name).unit,
+            UNITS[setting.unit.suffix] or meaning.unit,
             default,
             "" if choices else _allowed(setting),
             choices,
-            meaning,
+            meaning.text,
         )
 
 

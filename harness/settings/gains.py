@@ -37,13 +37,13 @@ def by_rule(flight: Flight, given: Collection[str]) -> Flight:
 def _gains(
     rule: Rule, law: Law, airspeed: float, period: float, response: "Response | None", why_unknown: str
 ) -> Mapping[str, float]:
-    from harness.limit_cycle.prediction import Loop, boundary
+    from harness.limit_cycle.prediction import CANNOT_HOLD, Loop, boundary
 
     def border(law_at: Callable[[float], Law], guess: float) -> float:
         if response is None:
             raise RuleError(why_unknown)
         if law.max_heading_rate * law.standoff <= airspeed:
-            raise RuleError("the circle cannot be held: the heading-rate limit is below what it takes")
+            raise RuleError(CANNOT_HOLD)
         found = boundary(lambda gain: Loop(law_at(gain), response, airspeed, period), guess)
         if math.isnan(found):
             raise RuleError("no gain was found at which a limit cycle begins")

@@ -70,7 +70,7 @@ class Air:
         `horizontal` with the velocity down at each period, m/s, and the way in each part, m: of shapes (count + 1, 3)
         and (count * len(parts), 2).
         """
-        steady = np.array([*self.steady, 0.0]) + 0.0  # minus zero is zero, as in `horizontal` and `drift`
+        steady = np.array([*self.steady, 0.0])
         velocity = np.tile(steady, (count + 1, 1))
         way = np.tile(np.multiply.outer(parts, steady[:2]), (count, 1))
         if len(self.gusts):

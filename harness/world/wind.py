@@ -1,7 +1,7 @@
 """The settings of a flight's wind."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Annotated
@@ -57,15 +57,17 @@ class Wind:
 
     def start(self, *, airspeed: float, altitude: float, step: float, duration: float, seed: int) -> Air:
         """The air of a flight at this nominal airspeed and altitude, on its grid of steps. SI."""
-        if self == Wind(steady=self.steady, rotation=self.rotation):
-            return Air(steady=self.steady)
+        north, east = self.steady
+        wind = replace(self, steady=(north + 0.0, east + 0.0))  # minus zero is zero: equal winds make the same air
+        if wind == Wind(steady=wind.steady, rotation=wind.rotation):
+            return Air(steady=wind.steady)
         steps = round(duration / step)
         try:
-            hash(self)
+            hash(wind)
         except TypeError:  # a list stands in place of a tuple
-            return _made.__wrapped__(self, airspeed, altitude, step, steps, seed)
+            return _made.__wrapped__(wind, airspeed, altitude, step, steps, seed)
         made = _made if steps <= _SHARED else _made.__wrapped__
-        return made(self, airspeed, altitude, step, steps, seed)
+        return made(wind, airspeed, altitude, step, steps, seed)
 
 
 @lru_cache(maxsize=1)
@@ -78,8 +80,7 @@ def _made(wind: Wind, airspeed: float, altitude: float, step: float, steps: int,
 
         W_x, W_y = wind.steady
         model = dryden(wind.turbulence, airspeed, altitude)
-        towards = math.atan2(W_y + 0.0, W_x + 0.0)  # of a wind of minus zero as of zero
-        field = turbulence(model, towards, seed, step, steps)
+        field = turbulence(model, math.atan2(W_y, W_x), seed, step, steps)
         gusts = gusts + field.velocity[field.lead :]
         rotation = field.rotation if wind.rotation else None
     gusts.setflags(write=False)
